@@ -7,9 +7,10 @@ from report.page import frame, render
 from simulation.foretold.bands import Prediction
 
 SAID = (
-    "Each of the laboratories drawn has parameters as sure as the diagnosis found them, sensors as noisy as they were, "
-    "and an error as large as what the diagnosis left unexplained; beyond the amplitudes and frequencies that were "
-    "seen this error grows. Ninety percent of the time a test shall lie within the band."
+    "The parameters of each laboratory are drawn from the uncertainty of the diagnosis, and its sensors have the noise "
+    "that was found. Each signal has an error as large as the part of the gap that the diagnosis left unexplained; the "
+    "error grows beyond the amplitudes and frequencies of the diagnosed recording. A test should lie within the band "
+    "for 90 % of the time."
 )
 
 
@@ -19,7 +20,7 @@ def page(found: Prediction, source: str) -> str:
     facts = [
         ("ground motion", f"{found.motion.describe()}, scaled by {plan.ground_motion.scale:g}"),
         ("duration", f"{plan.test.duration:g} s, {plan.ticks} ticks"),
-        ("found", source),
+        ("findings", source),
         ("laboratories", f"{found.draws} drawn, {found.diverged} of them unstable"),
     ]
     body = render(

@@ -1,4 +1,4 @@
-"""What a comparison of a recording with its prediction says, in sentences."""
+"""The results of comparing a recording with its prediction, in sentences."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from simulation.foretold.held import ENOUGH, Held, HeldSignal
 from simulation.foretold.rest import BEYOND, OUTSIDE
 from simulation.foretold.shape import ErrorShape
 
-# Share of a signal's error that one shape must explain for the error to be called that: more than half of it.
+# Share of a signal's error that one shape must explain for the error to be named after it: more than half.
 MOSTLY = 0.5
 SEVERAL = 3  # peaks that a sentence names
-NOISIER = "the sensor is noisier than it was."
+NOISIER = "the sensor is noisier than in the diagnosed recording."
 
 
 def sentences(found: Held) -> list[str]:
     """Whether the prediction held, what left its band first and how, what follows, and which peaks held."""
     other = (
-        "The test was recorded under another plan than the one that was foretold: a difference between the plans is "
-        "a part of what lies outside."
+        "The test and the prediction have different plans, so a part of what lies outside the band may come from that "
+        "difference."
     )
     return [*verdict(found), *peaks(found), *([] if found.same_plan else [other])]
 
@@ -30,9 +30,9 @@ def verdict(found: Held) -> list[str]:
     low = {name: one for name, one in found.signals.items() if one.inside < ENOUGH}
     if found.held:
         least = min(low, key=lambda name: low[name].inside, default="")
-        rest = f", of {least} {100 * low[least].inside:.0f} %" if least else ""
+        rest = f", for {least} {100 * low[least].inside:.0f} %" if least else ""
         return [f"The prediction held: {share}{rest}."]
-    said = f"The prediction did not hold: {share}, of {100 * HELD:.0f} % foretold."
+    said = f"The prediction did not hold: {share}, instead of {100 * HELD:.0f} %."
     readings = {name: one for name, one in low.items() if is_reading(found, name, one)}
     first = min(
         (one for one in (readings or low).items() if one[1].departures),
@@ -40,12 +40,12 @@ def verdict(found: Held) -> list[str]:
         default=None,
     )
     if first is None:
-        return [said, f"{', '.join(low)} left the band in many short departures, as noise does: {NOISIER}"]
+        return [said, f"{', '.join(low)} left the band for many short times, as noise does: {NOISIER}"]
     return [said, *of_first(found, *first)]
 
 
 def is_reading(found: Held, name: str, one: HeldSignal) -> bool:
-    """Whether a signal is measured in a laboratory; of a prediction that does not say it, every signal counts."""
+    """Whether a signal is measured in a laboratory; if the prediction's file does not say so, every signal counts."""
     names = found.figures.get("readings", {}).get(one.topic)
     return names is None or name.rpartition(".")[2] in names
 
@@ -58,10 +58,10 @@ def of_first(found: Held, name: str, one: HeldSignal) -> list[str]:
         f"t = {one.farthest_at:.2f} s, by {one.farthest:.2g} half widths of the band."
     )
     if one.shape.share <= MOSTLY:
-        how = f"No offset, drift, size, delay or noise explains most of the error of {name}: its form is another one."
+        how = f"No offset, drift, wrong amplitude, delay or noise explains most of the error of {name}."
         return [left, how, what_it_says(found, one.topic, start)]
     share = f"{100.0 * one.shape.share:.0f} % of its error"
-    how = f"Against what was foretold {in_words(one.shape, one.unit)}, which is {share}."
+    how = f"Compared with the prediction, {in_words(one.shape, one.unit)}, which explains {share}."
     follows = f"So {NOISIER}" if one.shape.kind == "noise" else what_it_says(found, one.topic, start)
     return [left, how, follows]
 
@@ -93,16 +93,17 @@ def what_it_says(found: Held, role: str, start: float) -> str:
     ratio, since = float(far.get("ratio", 0.0)), far.get("since")
     if ratio > BEYOND and (since is None or start >= since):
         return (
-            f"{lab} was then beyond the largest motion seen before, by up to {ratio:.2g} times, and what was found "
-            f"does not hold there: {both}"
+            f"{lab} was then beyond the largest motion of the diagnosed recording, by up to {ratio:.2g} times, and the "
+            f"findings do not hold there: {both}"
         )
     if float(far.get("energy_outside", 0.0)) > OUTSIDE:
         return (
-            f"{lab} moved at other frequencies than were seen, and what was found does not hold there: {both}"
+            f"{lab} moved at other frequencies than in the diagnosed recording, and the findings do not hold there: "
+            f"{both}"
         )
     return (
-        f"{lab} was then still within what was seen: it has changed since, or has an effect that the first recording "
-        "did not show; diagnose this recording, rths diagnose THIS."
+        f"{lab} was then still within the motion of the diagnosed recording, so it has changed since, or has an effect "
+        "that the diagnosed recording does not show: diagnose this recording, rths diagnose THIS."
     )
 
 
@@ -117,7 +118,7 @@ def peaks(found: Held) -> list[str]:
         quantity(one.peak, one.unit)
         + " of "
         + name
-        + " (foretold "
+        + " (predicted "
         + " to ".join(quantity(known[name][end], one.unit) for end in ("low", "high"))
         + ")"
         for name in outside[:SEVERAL]

@@ -32,7 +32,7 @@ def limits(found: Prediction) -> TitledTable:
         for name, one in near.items()
     ]
     head = ["limit", "at", "peak (band of 90 %)", "passed in"]
-    return TitledTable("", head, rows or [["none is half reached", "–", "–", "–"]])
+    return TitledTable("", head, rows or [["no limit is reached by half", "–", "–", "–"]])
 
 
 def chance(one: LimitChance, found: Prediction) -> str:

@@ -27,7 +27,7 @@ def steps(report: Report) -> list[Drawing]:
         *(
             (
                 pictures.history(item),
-                f"{wording.plain(item.signal).capitalize()} at its worst seconds, closed loop.",
+                f"{wording.plain(item.signal).capitalize()} in the seconds of its largest gap, closed loop.",
             )
             for item in details.histories[:MOST_HISTORIES]
         ),

@@ -250,7 +250,7 @@ def finish_errors(axis: Any, factor: float, unit: str, noise: float | None, erro
         axis.axhspan(
             -factor * noise, factor * noise, color=GREY, alpha=0.35, linewidth=0, label="noise floor"
         )
-    axis.set_ylabel(literal(f"left over\n{unit}"))
+    axis.set_ylabel(literal(f"residual\n{unit}"))
 
 
 def curve(item: NaturalCurve, names: tuple[str, str] = ("without the effect", "with the effect")) -> str:

@@ -150,7 +150,7 @@ def unknown(found: Unknown) -> Strange:
     drawn = pictures.curve(found.curve, names) if found.curve else ""
     return Strange(
         text + (f": {', '.join(facts)}." if facts else "."),
-        Rows(("depends on", "share of what is left over"), rows),
+        Rows(("depends on", "share of the residual"), rows),
         drawings((drawn, "What the catalogue leaves over.")),
     )
 

@@ -42,7 +42,7 @@ def needs(recording: Run, picture: Picture) -> str:
 _ALL = (
     Picture(
         "histories",
-        "ground, laboratories and floors over time: drift that grows, clipped peaks, holes",
+        "ground, laboratories and floors over time, which show growing drift, clipped peaks and holes",
         "any motion or force of ground, floors or laboratories",
         (SINGLE, 5.6),
         (DOUBLE, 6.0),
@@ -76,8 +76,8 @@ _ALL = (
     ),
     Picture(
         "spectra",
-        "amplitude density of ground, laboratories and tracking errors over frequency: errors beside the natural "
-        "frequency, peaks that no model has",
+        "amplitude density of ground, laboratories and tracking errors over frequency, which shows errors near the "
+        "natural frequency and peaks that no model has",
         "ground_acceleration or the motion of a laboratory over 64 ticks or more",
         (SINGLE, 4.6),
         (DOUBLE, 4.6),

@@ -9,7 +9,7 @@ from report.several import pictures, tables
 from report.several.runs import Chosen, OneRun
 from report.text.terminal import TitledTable
 
-ACROSS = 6  # columns that fit on paper beside the first one
+ACROSS = 7  # columns that fit on paper
 
 
 def page(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> str:
@@ -24,13 +24,14 @@ def page(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> str:
 
 
 def split(table: TitledTable) -> list[TitledTable]:
-    """A table as several ones, each with the first column and as many further ones as fit on paper."""
-    places = range(1, len(table.head), ACROSS)
+    """A table as several ones that fit on paper; each begins with the columns that tell the rows apart."""
+    keys = 1 if len({row[0] for row in table.rows}) == len(table.rows) else 2
+    step = ACROSS - keys
     return [
         TitledTable(
-            table.title if begin == 1 else "",
-            [table.head[0], *table.head[begin : begin + ACROSS]],
-            [[row[0], *row[begin : begin + ACROSS]] for row in table.rows],
+            table.title if begin == keys else "",
+            [*table.head[:keys], *table.head[begin : begin + step]],
+            [[*row[:keys], *row[begin : begin + step]] for row in table.rows],
         )
-        for begin in places
+        for begin in range(keys, len(table.head), step)
     ]

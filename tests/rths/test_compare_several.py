@@ -14,7 +14,9 @@ from common.plan.plan import Plan
 from common.plan.read import with_test
 from common.reality.reality import as_planned
 from common.recording.reader import read
+from report.several import page as several_page
 from report.several import runs
+from report.text.terminal import TitledTable
 from simulation import virtual
 from tests.rths.report.pages import check_in_browser
 
@@ -100,3 +102,15 @@ def test_more_than_can_be_told_apart_are_refused(call: Any, capsys: Any, three: 
 def test_files_of_one_name_are_told_apart_by_their_folders() -> None:
     assert runs.labelled([Path("a/x.mcap"), Path("b/x.mcap")]) == ["a/x", "b/x"]
     assert runs.labelled([Path("a/x.mcap"), Path("b/y.mcap")]) == ["x", "y"]
+
+
+def test_rows_of_a_table_that_is_split_can_be_told_apart() -> None:
+    head = ["recording", "system", *"abcdefg"]
+    rows = [
+        [recording, system, *"1234567"] for recording in ("one", "two") for system in ("actuator", "table")
+    ]
+    first, second = several_page.split(TitledTable("Tracking", head, rows))
+    assert first.head == head[:7]
+    assert second.head == ["recording", "system", "f", "g"]
+    assert second.rows[1] == ["one", "table", "6", "7"]
+    assert (first.title, second.title) == ("Tracking", "")

@@ -156,7 +156,7 @@ def test_a_prediction_is_a_recording_that_a_test_is_compared_with(
     assert not other.held
     told = said.sentences(other)
     assert "Of the laboratories' readings column_" in told[1]
-    assert "of the master was then still within what was seen" in told[3]
+    assert "of the master was then still within the motion of the diagnosed recording" in told[3]
     assert "peaks lie in their bands; farthest outside: " in told[4]
     assert cli.guarded(lambda: held_code(folder, "other")) == 1
     assert "The prediction did not hold" in capsys.readouterr().out
@@ -193,10 +193,15 @@ ELSEWHERE = {"beyond_seen": {"slave": {"ratio": 1.0, "since": None, "energy_outs
 @pytest.mark.parametrize(
     ("figures", "start", "kind", "says"),
     [
-        (FAR, 2.5, "size", "was then beyond the largest motion seen before, by up to 1.6 times"),
-        (FAR, 1.5, "delay", "was then still within what was seen"),
-        (ELSEWHERE, 1.5, "", "moved at other frequencies than were seen"),
-        (FAR, 2.5, "noise", "So the sensor is noisier than it was."),
+        (
+            FAR,
+            2.5,
+            "size",
+            "was then beyond the largest motion of the diagnosed recording, by up to 1.6 times",
+        ),
+        (FAR, 1.5, "delay", "was then still within the motion of the diagnosed recording"),
+        (ELSEWHERE, 1.5, "", "moved at other frequencies than in the diagnosed recording"),
+        (FAR, 2.5, "noise", "So the sensor is noisier than in the diagnosed recording."),
     ],
 )
 def test_what_follows_from_a_signal_outside_its_band(
@@ -206,11 +211,11 @@ def test_what_follows_from_a_signal_outside_its_band(
     left = held.Departure(start, start + 1.0, 3.0)
     signal = held.HeldSignal("slave", 0.4, (left,), 3.0, start, "N", 9.0, wrong)
     told = said.sentences(held.Held(100, {"damper_force": signal}, 0.4, False, figures, False))
-    assert "40 % of the time was inside its band, of 90 % foretold" in told[0]
+    assert "40 % of the time was inside its band, instead of 90 %" in told[0]
     assert f"damper_force left its band first, at t = {start:.2f} s" in told[1]
     assert ("No offset, drift" in told[2]) == (not kind)
     assert says in told[3]
-    assert "under another plan" in told[-1]
+    assert "have different plans" in told[-1]
 
 
 def held_code(folder: Path, name: str) -> int:
