@@ -18,6 +18,7 @@ from benchmarks import (
     recorder,
     scale,
     start,
+    sweep,
     udp_rig,
     virtual_time,
 )
@@ -38,6 +39,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "closed_loop": closed_loop.run,
     "virtual": virtual_time.run,
     "scale": scale.run,
+    "sweep": sweep.run,
     "recorder": recorder.run,
     "codec": codec.run,
     "udp_rig": udp_rig.run,

@@ -26,9 +26,11 @@ if TYPE_CHECKING:
     from validation.blind.cases.case import Case
     from validation.blind.predicted.foretell import ForetoldCase
     from validation.blind.predicted.next_test import NextTest
+    from validation.blind.progress import CasesDone
     from validation.blind.record import RecordedCase
     from validation.blind.results.measures import Measure
     from validation.blind.results.scoring import Outcome
+    from validation.blind.worker import Diagnosed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,12 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     which.add_argument(
         "--duration", type=float, default=30.0, metavar="S", help="length of each test (default: 30)"
     )
-    parser.add_argument(
-        "--jobs", type=int, default=1, metavar="N", help="number of processes; -1 for one per processor"
-    )
-    parser.add_argument(
-        "--dask", default="", metavar="ADDRESS", help="diagnose on a Dask cluster with the same file system"
-    )
+    cli.workers_arguments(parser)
     parser.add_argument(
         "--diagnosis",
         default=DIAGNOSIS,
@@ -89,10 +86,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw, record, diagnose and score the cases; 1 where a goal is missed, which takes more than a few cases."""
+    from simulation.workers.parts import ENDING, parts
+    from simulation.workers.parts import write as write_table
     from validation.blind.cases.basis import basis
     from validation.blind.draw import draw
     from validation.blind.predicted.next_test import next_test
     from validation.blind.predicted.results import measures as of_predictions
+    from validation.blind.progress import SCHEMA, TABLE, CasesDone
+    from validation.blind.progress import table as table_of
     from validation.blind.results.measures import measures
     from validation.blind.results.scoring import judge_all
 
@@ -101,18 +102,28 @@ def run(args: argparse.Namespace) -> int:
     cases = draw(args.cases, args.seed, args.set, trial=trial, only=args.only, effects=args.effects)
     about = said_of(args, trial)
     with (
-        outputs.folder(args.output, args.force) as folder,
+        outputs.folder(args.output, args.force, besides=(f"{TABLE}{ENDING}",)) as folder,
+        parts(folder / TABLE, what(args, trial), SCHEMA, len(cases), force=True) as there,
         tempfile.TemporaryDirectory(prefix="rths-recordings-") as place,
         Progress("blind trial") as progress,
     ):
-        recorded = record_cases(cases, Path(place), args.jobs, progress.tell)
-        answers = diagnose_cases(Path(place), len(cases), args, progress.tell)
+        done = CasesDone(there, cases)
+        missing = record_cases(done.missing, Path(place), args.jobs, progress.tell)
+        diagnose_cases(done, missing, Path(place), args, progress.tell)
+        recorded, answers = done.all(Path(place))
         outcomes = judge_all(cases, recorded, answers)
         if args.keep:
-            keep(cases, recorded, Path(place), folder)
+            again = [case for case in cases if case.index not in missing]
+            keep(
+                cases,
+                missing | record_cases(again, Path(place), args.jobs, progress.tell),
+                Path(place),
+                folder,
+            )
         following = [next_test(case, args.seed, args.set, trial) for case in cases] if args.predict else []
         foretold = foretell_cases(following, recorded, Path(place), args, progress.tell)
         found = write(folder, outcomes, about, foretold)
+        write_table(folder / TABLE, table_of(cases, found["cases"]), force=True)
     table = [*measures(outcomes), *(of_predictions(foretold) if foretold else ())]
     if args.json:
         sys.stdout.write(json.dumps(found) + "\n")
@@ -170,20 +181,38 @@ def record_cases(cases: Sequence[Case], folder: Path, jobs: int, tell: Tell) -> 
     return recorded
 
 
-def diagnose_cases(folder: Path, total: int, args: argparse.Namespace, tell: Tell) -> dict[str, Any]:
-    """Answers by the name of the recording."""
+def diagnose_cases(
+    cases: CasesDone,
+    recorded: dict[int, RecordedCase],
+    place: Path,
+    args: argparse.Namespace,
+    tell: Tell,
+) -> None:
+    """Diagnose the recordings in the folder `place`, and keep each answer as soon as it is said."""
     from validation.blind.judge import diagnose_all
 
+    if not recorded:
+        return
+    by_name = {Path(one.name).stem: one for one in recorded.values()}
     count = itertools.count(1)
-    tell("diagnosed", 0, total)
+    tell("diagnosed", 0, len(recorded))
 
-    def done(_name: str) -> None:
-        tell("diagnosed", next(count), total)
+    def done(said: Diagnosed) -> None:
+        cases.add(by_name[said.name], said)
+        tell("diagnosed", next(count), len(recorded))
 
-    found = folder if args.predict else None
-    return diagnose_all(
-        folder, jobs=args.jobs, dask=args.dask, diagnosis=args.diagnosis, done=done, found=found
+    diagnose_all(
+        place, jobs=args.jobs, dask=args.dask, diagnosis=args.diagnosis, done=done, found=args.predict
     )
+
+
+def what(args: argparse.Namespace, trial: TrialBasis) -> dict[str, Any]:
+    """What the answers of a trial depend on, by names."""
+    from simulation.workers.versions import versions
+
+    names = ("cases", "set", "seed", "only", "effects", "duration", "diagnosis", "predict")
+    said = {name: getattr(args, name) for name in names}
+    return said | {"plan": trial.plan.digest(), "version": versions()}
 
 
 def foretell_cases(

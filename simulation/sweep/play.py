@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from common.errors import InputError
+from common.errors import InputError, PlanError
 from common.plan.plan import Plan
 from common.reality.reality import from_reality
 from common.roles import MASTER
@@ -31,12 +31,14 @@ from simulation.workers.versions import versions
 
 SIZE = 64  # tests in a task: a quarter of a second of 40 s tests, so that sending them costs about 1 %
 
+MOST_STAGES = 4  # of a worker of a cluster, which serves one sweep after the other; each may hold 10 MB
+
 
 class Task(NamedTuple):
     """The tests `number · SIZE` and following of a sweep."""
 
     luggage: Luggage
-    digest: str  # of the luggage, by which a worker knows it again
+    digest: str  # of all that the rows depend on, by which a worker knows the luggage again
     number: int
 
 
@@ -81,7 +83,7 @@ class Stage:
 
 @lru_cache(maxsize=1)
 def stages() -> dict[str, Stage]:
-    """The stages that this process has made, by the digest of their luggage."""
+    """The stages that this process has made, by the digest of their tasks."""
     return {}
 
 
@@ -93,8 +95,10 @@ def batch(task: Task) -> Batch:
     """
     kept = stages()
     if task.digest not in kept:
+        while len(kept) >= MOST_STAGES:
+            kept.pop(next(iter(kept)), None)
         kept[task.digest] = Stage(task.luggage)
-    stage = kept[task.digest]
+    stage = kept.get(task.digest) or Stage(task.luggage)  # another thread may have taken it out
     first = task.number * SIZE
     numbers = range(first, min(first + SIZE, stage.sweep.rows))
     found = [test(stage, rows.row(stage.sweep, number)) for number in numbers]
@@ -133,8 +137,10 @@ def rollout(stage: Stage, plan: Plan, one: Row, strong: Excitation) -> Rollout:
     noise = stage.sweep.head.noise
     if not stage.reality:
         return simulate(plan, strong.rows, seed=plan.test.seed if noise else None)
-    truth = from_reality(dict(stage.reality), plan, stage.sweep.base)
-    truth = replace(truth, seed=plan.test.seed)
+    try:
+        truth = replace(from_reality(dict(stage.reality), plan, stage.sweep.base), seed=plan.test.seed)
+    except PlanError as error:
+        raise PlanError(f"The reality {stage.sweep.head.reality}: {error}") from None
     refuse_plugins(truth)
     systems = {MASTER: true_system(truth)} | true_slaves(truth)
     return rolled_out(truth, systems, stage.motion(one.motion), noise=noise)

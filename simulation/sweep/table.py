@@ -10,6 +10,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from common.reality.found import digest
 from common.terminal.telling import Tell, untold
 from simulation.sweep import luggage, measures, rows
 from simulation.sweep.definition import Sweep
@@ -83,7 +84,8 @@ def table(path: Path, sweep: Sweep, way: Way, *, force: bool = False, tell: Tell
     count = math.ceil(sweep.rows / SIZE)
     said = json.loads(json.dumps(about(sweep, given), default=str))
     with parts(path, said, columns, count, force=force) as found:
-        tasks = [Task(given, given.digest, number) for number in range(count)]
+        known = digest(said)
+        tasks = [Task(given, known, number) for number in range(count)]
         made = complete(found, batch, tasks, way, tell)
         made = made.replace_schema_metadata({"rths": json.dumps(said, sort_keys=True)})
         write(path, made, force=force)

@@ -20,9 +20,9 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 REACH = 10.0  # s, for a scheduler to answer and for its first worker to be there
-# Tasks that are with the scheduler at once: four for each of 64 workers, so that none waits for its next one, while
-# the scheduler holds the inputs of these alone.
-WINDOW = 256
+AHEAD = (
+    2  # tasks with the scheduler for each thread of its workers: none waits, and few inputs are held there
+)
 
 
 def spread(function: Callable[[Item], Result], items: Sequence[Item], address: str) -> Iterator[Result]:
@@ -38,16 +38,21 @@ def spread(function: Callable[[Item], Result], items: Sequence[Item], address: s
     with connected(distributed, address) as client:
         waiting = iter(items)
         running = distributed.as_completed(loop=client.loop)
-        for item in waiting:
-            running.add(submit(client, function, item))
-            if running.count() == WINDOW:
-                break
+        top_up(client, running, waiting, function)
         for future in running:
             yield result(future, address)
             future.release()
-            for item in waiting:
-                running.add(submit(client, function, item))
-                break
+            top_up(client, running, waiting, function)
+
+
+def top_up(client: Any, running: Any, waiting: Iterator[Item], function: Callable[[Item], Any]) -> None:
+    """Send tasks until there are `AHEAD` for each thread that the workers have, but one at least."""
+    most = max(AHEAD * sum(client.nthreads().values()), 1)
+    while running.count() < most:
+        item = next(waiting, None)
+        if item is None:
+            return
+        running.add(submit(client, function, item))
 
 
 @contextlib.contextmanager

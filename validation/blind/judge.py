@@ -5,19 +5,18 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from common.errors import InputError
 from diagnosis.report import read
 from diagnosis.report.records import Report
-from validation.blind.worker import DIAGNOSIS, ENDINGS
+from validation.blind.worker import DIAGNOSIS, ENDINGS, RECORDING, Diagnosed
 
 HOME = Path(__file__).resolve().parents[2]
 KEPT = ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "NUMBA_CACHE_DIR", "SYSTEMROOT")
@@ -42,12 +41,12 @@ def diagnose_all(
     jobs: int = 1,
     dask: str = "",
     diagnosis: str = DIAGNOSIS,
-    done: Callable[[str], None] = lambda _name: None,
-    found: Path | None = None,
+    done: Callable[[Diagnosed], None] = lambda _answer: None,
+    found: bool = False,
 ) -> dict[str, DiagnosisAnswer]:
-    """Answers by the name of the recording; `done` is called with the name of each finished one.
+    """Answers by the name of the recording; `done` is called with what is said of each, as soon as it is said.
 
-    What was found in each recording is written into the folder `found`, if given.
+    With `found` that includes the files that say what was found in it.
 
     Raises:
         InputError: the process failed.
@@ -56,11 +55,9 @@ def diagnose_all(
         out = Path(place) / "reports"
         words = [str(folder), str(out), "--jobs", str(jobs), "--diagnosis", diagnosis]
         words += (["--dask", dask] if dask else []) + (["--found"] if found else [])
-        _work(words, Path(place), jobs, done)
-        if found is not None:
-            for path in (one for one in out.iterdir() if one.suffix in ENDINGS):
-                shutil.copy(path, found / path.name)
-        return {f"{path.stem}.mcap": _answer(path) for path in sorted(out.glob("*.json"))}
+        _work(words, Path(place), jobs, lambda name: done(_diagnosed(out / f"{name}.json")))
+        said = map(_diagnosed, sorted(out.glob("*.json")))
+        return {f"{one.name}{RECORDING}": answer(one.answer, one.name) for one in said}
 
 
 def _work(words: list[str], place: Path, jobs: int, done: Callable[[str], None]) -> None:
@@ -105,8 +102,15 @@ def environment(jobs: int) -> dict[str, str]:
     return kept | threads | {"PYTHONPATH": str(HOME), "PYTHONHASHSEED": "0"}
 
 
-def _answer(path: Path) -> DiagnosisAnswer:
+def _diagnosed(path: Path) -> Diagnosed:
+    """What the process wrote of a recording."""
+    files = [one for one in map(path.with_suffix, ENDINGS) if one.exists()]
     data = json.loads(path.read_text(encoding="utf-8"))
-    where = f"The report on {path.stem}"
-    reports = {name: read.report(said, where) for name, said in data.get("reports", {}).items()}
+    return Diagnosed(path.stem, data, {one.suffix: one.read_bytes() for one in files})
+
+
+def answer(data: Mapping[str, Any], name: str) -> DiagnosisAnswer:
+    """The answer on the recording of this name that JSON holds."""
+    where = f"The report on {name}"
+    reports = {slave: read.report(said, where) for slave, said in data.get("reports", {}).items()}
     return DiagnosisAnswer(reports, float(data["seconds"]), data.get("error", ""))

@@ -126,7 +126,7 @@ def test_the_diagnosing_process_sees_recordings_only(tmp_path: Path, monkeypatch
     monkeypatch.setenv("RTHS_TRUTH", "damper.friction")
     found = {item.name for item in record_all(cases(2), tmp_path)}
     done: list[str] = []
-    answers = diagnose_all(tmp_path, diagnosis=f"{HERE}:spy", done=done.append)
+    answers = diagnose_all(tmp_path, diagnosis=f"{HERE}:spy", done=lambda said: done.append(said.name))
     assert set(answers) == found == {f"{name}.mcap" for name in done}
     for answer in answers.values():
         assert answer.seconds > 0.0
@@ -269,3 +269,47 @@ def test_a_missing_package_is_one_sentence(
     assert capsys.readouterr().err == (
         f"rths: {words[0]} needs the package {package}: {how}, or omit the option.\n"
     )
+
+
+def test_a_trial_goes_on_where_it_was_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = (
+        "--cases",
+        "3",
+        "--seed",
+        "1",
+        "--set",
+        "tune",
+        "--duration",
+        "1.5",
+        "--diagnosis",
+        f"{HERE}:no_gap",
+    )
+    monkeypatch.setattr("validation.blind.results.page.page", lambda *_: "drawn elsewhere")
+    asked: list[int] = []
+
+    def interrupted(folder: Path, **rest: Any) -> None:
+        recordings = sorted(folder.glob("*.mcap"))
+        asked.append(len(recordings))
+        for path in recordings[1:]:
+            path.unlink()
+        diagnose_all(folder, **rest)
+        if recordings:
+            raise KeyboardInterrupt
+
+    def watched(folder: Path, **rest: Any) -> None:
+        asked.append(len(list(folder.glob("*.mcap"))))
+        diagnose_all(folder, **rest)
+
+    assert command(*words, "-o", str(tmp_path / "whole")) in (0, 1)
+    monkeypatch.setattr("validation.blind.judge.diagnose_all", interrupted)
+    assert command(*words, "-o", str(tmp_path / "again")) == 3
+    monkeypatch.setattr("validation.blind.judge.diagnose_all", watched)
+    assert command(*words, "-o", str(tmp_path / "again")) in (0, 1)
+    assert asked == [0, 3, 0, 2]  # the check of the diagnosis, then the cases that are not done
+    tables = [(tmp_path / name / "results.parquet").read_bytes() for name in ("whole", "again")]
+    assert tables[0] == tables[1]
+    assert {path.name for path in (tmp_path / "again").iterdir()} == {
+        "index.html",
+        "results.json",
+        "results.parquet",
+    }

@@ -11,9 +11,11 @@ from pyarrow import parquet
 
 from common.errors import InputError
 from common.plan import read as plans
+from common.reality import reality as realities
 from loop import substructure
 from loop.closed_loop import simulate
 from loop.nominal import limited
+from loop.of_reality import really
 from loop.signals import by_role
 from models.ground_motion.motions import FOLDER
 from simulation.sweep import definition, luggage, measures, play, rows, table
@@ -132,7 +134,7 @@ def test_files_travel_with_the_tests(file: Path, tmp_path: Path, monkeypatch: py
     shutil.rmtree(tmp_path / "records")
     file.unlink()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    found = play.batch(play.Task(given, given.digest, 0))
+    found = play.batch(play.Task(given, "files that travel", 0))
     assert len(found.columns["row"]) == 24
     assert found.columns["record"][0].startswith("file own.AT2, digest ")
 
@@ -185,3 +187,28 @@ def test_what_cannot_be_swept_is_said_in_one_sentence(change: str, complaint: st
         table.table(tmp_path / "a.parquet", definition.load(file), Way())
     assert str(error.value).count("\n") == 0
     assert list(tmp_path.iterdir()) == [file]
+
+
+def test_what_was_found_of_another_plan_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "found.toml").write_text("[found]\nmodels = '0123456789abcdef'\n")
+    sweep = definition.from_tables({"reality": "found.toml"}, tmp_path)
+    with pytest.raises(
+        InputError, match="The reality found.toml: it was found with other nominal models than this"
+    ):
+        table.table(tmp_path / "a.parquet", sweep, Way())
+
+
+def test_the_tests_of_a_reality_are_those_of_its_laboratories(tmp_path: Path) -> None:
+    text = "[[effect]]\nname = 'column.friction'\nforce = 900.0\n"
+    (tmp_path / "hidden.toml").write_text(text)
+    brief = {"parameters": {"test.duration": [2.0]}, "motion": [{"scales": [0.2]}]}
+    plain, hidden = (
+        table.table(tmp_path / f"{len(more)}.parquet", definition.from_tables(brief | more, tmp_path), Way())
+        for more in ({}, {"reality": "hidden.toml"})
+    )
+    plan = rows.plan_of(
+        definition.from_tables(brief, tmp_path), rows.row(definition.from_tables(brief, tmp_path), 0)
+    )
+    rollout = really(realities.load(tmp_path / "hidden.toml", plan), noise=False)
+    drift = float(np.max(np.abs(rollout.master["displacement"])))
+    assert hidden.column("peak_drift")[0].as_py() == drift != plain.column("peak_drift")[0].as_py()
