@@ -27,7 +27,7 @@ SCHEMA = pa.schema(
         *(pa.field(ending, pa.binary()) for ending in ENDINGS),
     ]
 )
-MEASURED = ("seconds",)  # what depends on the machine
+DRAWN = ("seconds", "recording")  # what another trial of the same cases has otherwise: times, random names
 
 
 class CasesDone:
@@ -74,7 +74,7 @@ def table(cases: Sequence[Case], outcomes: Sequence[Mapping[str, Any]]) -> pa.Ta
     """The judged cases as a table: one row each, with what computes it again; nested values as JSON."""
     rows = []
     for case, outcome in zip(cases, outcomes, strict=True):
-        kept = {name: cell(value) for name, value in outcome.items() if name not in MEASURED}
+        kept = {name: cell(value) for name, value in outcome.items() if name not in DRAWN}
         plan = plans.from_tables(case.plan, Path())
         rows.append(kept | {"plan": plan.digest(), "seed": case.seed, "versions": versions()})
     return pa.Table.from_pylist(rows)

@@ -272,18 +272,7 @@ def test_a_missing_package_is_one_sentence(
 
 
 def test_a_trial_goes_on_where_it_was_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    words = (
-        "--cases",
-        "3",
-        "--seed",
-        "1",
-        "--set",
-        "tune",
-        "--duration",
-        "1.5",
-        "--diagnosis",
-        f"{HERE}:no_gap",
-    )
+    words = ("--cases", "2", "--only", "clean", "--duration", "1.5", "--diagnosis", f"{HERE}:no_gap")
     monkeypatch.setattr("validation.blind.results.page.page", lambda *_: "drawn elsewhere")
     asked: list[int] = []
 
@@ -305,7 +294,7 @@ def test_a_trial_goes_on_where_it_was_interrupted(tmp_path: Path, monkeypatch: p
     assert command(*words, "-o", str(tmp_path / "again")) == 3
     monkeypatch.setattr("validation.blind.judge.diagnose_all", watched)
     assert command(*words, "-o", str(tmp_path / "again")) in (0, 1)
-    assert asked == [0, 3, 0, 2]  # the check of the diagnosis, then the cases that are not done
+    assert asked == [0, 2, 0, 1]  # the check of the diagnosis, then the cases that are not done
     tables = [(tmp_path / name / "results.parquet").read_bytes() for name in ("whole", "again")]
     assert tables[0] == tables[1]
     assert {path.name for path in (tmp_path / "again").iterdir()} == {
