@@ -1,4 +1,4 @@
-"""What the documents have from the code is what the code says."""
+"""The generated parts of the documents agree with the code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The house's own rules, as far as a test can hold them."""
+"""Rules of the code base that a test can check."""
 
 from __future__ import annotations
 

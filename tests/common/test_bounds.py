@@ -1,4 +1,4 @@
-"""Recordings made to hurt: the bounds are hit early, and no honest recording comes near them."""
+"""Recordings made to exhaust memory are refused early, and real recordings stay far below the bounds."""
 
 from __future__ import annotations
 

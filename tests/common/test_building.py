@@ -1,4 +1,4 @@
-"""Whether the parts of a plan fit together: matrix, damping, what the specimen takes over, the actuator's model."""
+"""Checks that the parts of a plan fit together: matrix, damping, the specimen's share, the actuator's model."""
 
 from __future__ import annotations
 

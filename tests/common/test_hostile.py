@@ -1,4 +1,4 @@
-"""Hostile frames at the decoders: each rejected for its reason, counted, and followed by nothing."""
+"""Hostile frames at the decoders: each is rejected for its reason and counted, and has no other effect."""
 
 from __future__ import annotations
 
@@ -433,7 +433,7 @@ def is_message_or_rejected(frame: bytes) -> None:
 
 
 @given(st.binary(max_size=400))
-def test_any_bytes(noise: bytes) -> None:
+def test_any_bytes_are_decoded_or_rejected(noise: bytes) -> None:
     is_message_or_rejected(noise)
     is_message_or_rejected(signed(noise))
 

@@ -1,4 +1,4 @@
-"""Hostile files: plans and recordings that nobody wrote with this software, or that a disk has damaged."""
+"""Hostile files: plans and recordings that were not written by this program, or that a disk has damaged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When late ticks are told, and how often."""
+"""When late ticks are reported, and how often."""
 
 from __future__ import annotations
 

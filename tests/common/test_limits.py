@@ -1,4 +1,4 @@
-"""A violation of a limit in words."""
+"""The message about a violated limit."""
 
 from __future__ import annotations
 

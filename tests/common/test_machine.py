@@ -1,4 +1,4 @@
-"""What a host says of itself, read from the real kernel and from files made up."""
+"""The description of the host, read from the real kernel and from made-up files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""NamedTuples made without their own constructor."""
+"""NamedTuples that are made without their own constructor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Outputs: what exists stays, what fails leaves nothing, and of two commands one gets the name."""
+"""Output files: existing files stay, a failed command leaves none, and only one of two commands gets a name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What plans that differ are told to differ in."""
+"""The message about the keys in which two plans differ."""
 
 from __future__ import annotations
 

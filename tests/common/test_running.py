@@ -1,4 +1,4 @@
-"""Which tests run on this machine, and what a second one is told."""
+"""The list of tests that run on this machine, and the message for a second one."""
 
 from __future__ import annotations
 

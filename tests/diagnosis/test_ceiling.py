@@ -95,13 +95,13 @@ def test_a_constant_input_does_no_harm() -> None:
     assert ceiling(np.ones((N, 2)), residual, *split(N, H), 1.0, H) > 0.9
 
 
-def test_plays_are_plays() -> None:
+def test_a_play_operator_of_the_model_equals_the_kernel_for_play() -> None:
     x = drive(1)[:3000, None]
     np.testing.assert_allclose((plays(x) + x)[:, 4], play(x[:, 0], 0.1 * float(np.max(np.abs(x)))))
 
 
 @pytest.mark.parametrize(("cause", "first"), [("friction", "v"), ("cubic", "x"), ("drift", "t")])
-def test_the_coordinate_is_named(cause: str, first: str) -> None:
+def test_the_coordinate_on_which_a_residual_depends_is_named(cause: str, first: str) -> None:
     x = drive(4)
     wanted = CAUSES[cause](x)
     residual = 2.0 * wanted / wanted.std() + np.random.default_rng(0).standard_normal(N)

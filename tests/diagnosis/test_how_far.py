@@ -128,7 +128,7 @@ def test_withheld_time_is_a_good_part_of_the_test(cases: Cases) -> None:
     assert not mask.all()
 
 
-def test_what_closed_means() -> None:
+def test_the_closed_share_is_that_of_the_gap_above_the_noise() -> None:
     assert closed_share(0.11, 0.02, 0.01) == pytest.approx(0.9)
     assert closed_share(0.01, 0.01, 0.01) == 0.0
     assert overall({"a": 3.0, "b": 4.0}) == pytest.approx(np.sqrt(12.5))

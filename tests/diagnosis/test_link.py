@@ -1,4 +1,4 @@
-"""What a recording says of its messages: parameters found again, nothing found where nothing is."""
+"""Effects on the link, found from the messages in a recording; none is found on an undisturbed link."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The test that tells candidates apart, and silence where there is nothing to tell."""
+"""The proposed test that tells candidates apart; nothing is proposed if the verdict is clear."""
 
 from __future__ import annotations
 

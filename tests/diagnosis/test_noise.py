@@ -1,4 +1,4 @@
-"""The step that readings are rounded to."""
+"""The step to which readings are rounded."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from diagnosis.signals.noise import quantum
 
 
 @pytest.mark.parametrize("n", [1, 5, 9, 50, 2000])
-def test_constants(n: int) -> None:
+def test_a_constant_reading_has_no_quantum(n: int) -> None:
     assert quantum(np.full(n, 3.3)) == 0.0
 
 

@@ -1,4 +1,4 @@
-"""Effects of every site are found in laboratories whose parameters are a little off, and nothing where nothing is."""
+"""Effects of every site are found in laboratories whose parameters are slightly off; clean ones have none."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def test_z_is_standard_under_white_noise() -> None:
     assert z.std() == pytest.approx(1.0, abs=0.15)
 
 
-def test_windows_say_when() -> None:
+def test_windows_show_when_a_residual_is_large() -> None:
     residual = white(4)
     residual[5000:7500] *= 5.0
     found = windows(residual, 1.0, H)
@@ -98,7 +98,7 @@ def test_the_band_of_a_tone_and_of_a_chirp() -> None:
     assert 5.0 < high < 6.2
 
 
-def test_by_amplitude() -> None:
+def test_a_residual_that_grows_with_the_amplitude_is_shown_over_it() -> None:
     amplitude = 1.0 + T / 30.0
     drive = amplitude * np.sin(2.0 * np.pi * 3.0 * T)
     at, ratio = by_amplitude(amplitude**2 * white(9), drive, 1.0, 5)

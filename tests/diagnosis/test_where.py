@@ -1,4 +1,4 @@
-"""Shares of a gap, and the sites that residuals speak for."""
+"""Shares of a gap, and the sites that residuals indicate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The runner of the documents: what is shown is run, and what parts from it is found."""
+"""The runner of the documents: it runs the commands of a page and finds each difference from the text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The longest way to rest, from the ramp of every kind that a plan hosts."""
+"""The longest ramp to rest among the kinds that a plan hosts."""
 
 from __future__ import annotations
 

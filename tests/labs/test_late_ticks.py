@@ -1,4 +1,4 @@
-"""Processes that the host pauses, on a simulated clock: what an emulation makes good, and what a rig's figures stop."""
+"""Processes that the host pauses, on a simulated clock: an emulation catches up, and with a rig the test stops."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all three processes together take more of as a test goes on, in virtual time."""
+"""The memory and files that all three processes together take as a test goes on, in virtual time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a user watches while a test runs is what the master has measured."""
+"""The progress that a user sees while a test runs shows the master's measurements."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests whose rigs stand in other processes: the same bits as with the rig in the process, and the way to rest."""
+"""Tests whose rigs stand in other processes: the same bits as with the rig in the process, and the ramp to rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A building cut in two: its matrices, what is left out, the delay that it bears, what a delay costs."""
+"""A building cut in two: its matrices, its critical delay, and the damping that a delay costs."""
 
 from __future__ import annotations
 

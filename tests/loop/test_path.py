@@ -1,4 +1,4 @@
-"""The column's path: its delay follows the phase from frequency zero, and an unstable one is told."""
+"""The column's path: its delay follows the phase from frequency zero, and an unstable path is reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What nominal models say against a test: margin of delay, room below the limits, several slaves."""
+"""Risks that the nominal models show: margin of delay, peaks below the limits, several slaves."""
 
 from __future__ import annotations
 

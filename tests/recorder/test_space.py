@@ -1,4 +1,4 @@
-"""The size of a recording beforehand, and what is said where a disk has no room for it."""
+"""The expected size of a recording, and the message if the disk has no room for it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording with values at the ends of their kinds, which other programs may spoil."""
+"""A recording with the largest and smallest values of every type, which other programs may change."""
 
 from __future__ import annotations
 

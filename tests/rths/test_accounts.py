@@ -1,4 +1,4 @@
-"""sent = used + rejected + lost, whoever else sends what."""
+"""The account of messages, sent = used + rejected + lost, holds whatever strangers send."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said of the clock and the rigs of a recording, and its response storey by storey."""
+"""The sentences on the clock and the rigs of a recording, and its response storey by storey."""
 
 from __future__ import annotations
 

@@ -204,7 +204,7 @@ def test_the_gap_of_a_bench_test_closes_to_its_floor(call: Any, tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_missing_channels_are_said(call: Any, capsys: Any, cases: Cases, tmp_path: Path) -> None:
+def test_missing_channels_are_reported(call: Any, capsys: Any, cases: Cases, tmp_path: Path) -> None:
     table, again = tmp_path / "out.csv", tmp_path / "again.mcap"
     assert call("export", cases.file(FRICTION, duration=8.0), "-o", table) == 0
     names = ("table_command", "damper_command", "table_acceleration", "damper_stroke", "damper_force")

@@ -1,4 +1,4 @@
-"""Only ticks that were due can be missing."""
+"""Only ticks up to the end of a test can be missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recording's late ticks mean for its result, in its summary and its verdict."""
+"""The sentences on a recording's late ticks, in its summary and its verdict."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ UNREPLACED = {
 
 
 @pytest.mark.parametrize("name", WRITES)
-def test_what_exists_stays(
+def test_an_existing_file_stays(
     name: str, call: Any, capsys: Any, tmp_path: Path, virtual_recording: Path
 ) -> None:
     verb, (words, option) = re.split("[, ]", name)[0], WRITES[name]

@@ -1,4 +1,4 @@
-"""What `rths plot` draws where, and what it says to words it does not know."""
+"""The pictures that `rths plot` draws, their folders, and the message for an unknown picture."""
 
 from __future__ import annotations
 

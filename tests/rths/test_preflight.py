@@ -1,4 +1,4 @@
-"""What a user meets before a test starts: refusals, and risks taken by name."""
+"""Pre-flight as a user sees it: refusals, and risks accepted by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`rths replay` of tests of other kinds of laboratory: to the last bit, and no further."""
+"""`rths replay` of tests with other kinds of laboratory: equal to the last bit, and one changed bit is found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How `rths run` understands its processes, when it stops them, and what it calls the cause."""
+"""How `rths run` reads the reports of its processes, when it stops them, and the cause that it names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands on a terminal while a test runs, and what goes into a file instead."""
+"""The display on a terminal while a test runs, and the plain lines that go into a file instead."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A plan with the models that were found: what it says, what it cannot say, and which compensator serves best."""
+"""A plan with the models that were found: its keys, the findings it cannot express, and the best compensator."""
 
 from __future__ import annotations
 

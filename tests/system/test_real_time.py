@@ -1,4 +1,4 @@
-"""What a test in real time gives, on real processes, sockets and files."""
+"""A test in real time on real processes, sockets and files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a test in real time takes from its machine and what its recording says of that."""
+"""The real-time settings that a test takes on its machine, and their record in the recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ctrl-C twice in mid-motion, with real processes: the ramp to rest is walked to its end, and recorded."""
+"""Ctrl-C twice in mid-motion, with real processes: the ramp to rest goes on to its end, and is recorded."""
 
 from __future__ import annotations
 

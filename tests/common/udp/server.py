@@ -1,4 +1,4 @@
-"""The example's server in a thread, and rigs that answer what a test wants."""
+"""The example's server in a thread, and rigs with scripted answers."""
 
 from __future__ import annotations
 

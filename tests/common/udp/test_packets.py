@@ -1,4 +1,4 @@
-"""The packets: every byte is checked, and the example that users copy agrees with the laboratory on all of them."""
+"""The packets: every byte is checked, and the example for users reads and writes the same packets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A rig in another process that is late, silent, old, damaged or stopped: what its laboratory makes of it."""
+"""The laboratory of a rig in another process whose answers are late, missing, old or damaged, or that has stopped."""
 
 from __future__ import annotations
 

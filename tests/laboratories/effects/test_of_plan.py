@@ -1,4 +1,4 @@
-"""Which effects the test of a plan can have, and over which laboratory a reality lays them."""
+"""The effects that the test of a plan can have, and the laboratories to which a reality applies them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters of a user's kind of laboratory from what its own kernel makes of a motion."""
+"""Parameters of a user's kind of laboratory, identified from the response of its own kernel."""
 
 from __future__ import annotations
 

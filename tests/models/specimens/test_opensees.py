@@ -51,7 +51,7 @@ def ours(name: str, deformations: Array, **params: float) -> Array:
 
 
 @pytest.mark.parametrize("hardening", [0.0, 0.05, 0.3])
-def test_bilinear_is_steel01(ops: Any, hardening: float) -> None:
+def test_bilinear_equals_steel01(ops: Any, hardening: float) -> None:
     points = path(200)
     expected = theirs(ops, points, "Steel01", K * DY, K, hardening)
     np.testing.assert_allclose(
@@ -69,7 +69,7 @@ def test_menegotto_and_pinto_is_steel02(ops: Any, sharpness: float) -> None:
 
 @pytest.mark.parametrize("n", [1.0, 2.0, 4.0])
 @pytest.mark.parametrize(("beta", "gamma"), [(0.5, 0.5), (0.8, 0.2), (0.3, 0.7)])
-def test_bouc_wen_is_theirs(ops: Any, n: float, beta: float, gamma: float) -> None:
+def test_bouc_wen_equals_that_of_opensees(ops: Any, n: float, beta: float, gamma: float) -> None:
     # theirs has units of m⁻ⁿ and integrates by backward Euler, of order 1 in the step
     points = path(4000)
     unit = DY**-n
@@ -81,7 +81,7 @@ def test_bouc_wen_is_theirs(ops: Any, n: float, beta: float, gamma: float) -> No
 
 
 @pytest.mark.parametrize(("force", "place", "unloading"), [(1.0, 1.0, 0.0), (0.3, 0.6, 0.0), (0.5, 0.4, 0.3)])
-def test_pinched_is_hysteretic(ops: Any, force: float, place: float, unloading: float) -> None:
+def test_pinched_equals_hysteretic(ops: Any, force: float, place: float, unloading: float) -> None:
     # theirs ends in a third point, beyond which its last line goes on
     points, first, last = path(2000), 0.5, 40.0
     bend, yields = first * K * DY, (first + 0.5 * 0.4) * K * DY
@@ -144,7 +144,7 @@ def test_trilinear_is_a_sum_of_steel01(ops: Any) -> None:
 
 
 @pytest.mark.parametrize("loop", [0.3, 0.9])
-def test_self_centring_is_theirs(ops: Any, loop: float) -> None:
+def test_self_centring_equals_that_of_opensees(ops: Any, loop: float) -> None:
     # theirs leaves a line up to one increment late
     points = path(2000)
     expected = theirs(ops, points, "SelfCentering", K, 0.1 * K, K * DY, loop)
@@ -152,7 +152,7 @@ def test_self_centring_is_theirs(ops: Any, loop: float) -> None:
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-3 * K * DY)
 
 
-def test_degradation_is_theirs(ops: Any) -> None:
+def test_degradation_equals_that_of_opensees(ops: Any) -> None:
     # their energy is k·∫z dx over lengths, ours over k·δ_y²
     points, n, rate = path(4000), 2.0, 1.0 / (K * DY**2)
     unit = DY**-n

@@ -84,7 +84,7 @@ def test_reports_fit_the_schema(name: str) -> None:
         {"details": {"paths": {"sideways": {}}}},
     ],
 )
-def test_the_schema_refuses(change: Report) -> None:
+def test_the_schema_refuses_a_report_with_a_fault(change: Report) -> None:
     assert not validator().is_valid(fresh("explained") | change)
 
 

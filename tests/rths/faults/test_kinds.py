@@ -1,4 +1,4 @@
-"""Faults in tests whose laboratories are not of the default kinds: what must hold is asked of the kinds."""
+"""Faults in tests with other kinds of laboratory than the default test's; the invariants follow from the kinds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whole tests on simulated machines: like virtual time where nothing goes wrong, and what is seen where it does."""
+"""Whole tests on simulated machines: without faults they equal virtual time, and faults have their effects."""
 
 from __future__ import annotations
 

@@ -192,7 +192,7 @@ def test_a_percentile_next_to_the_maximum_is_not_judged() -> None:
     assert verdict(noisy.run(late_in(0.0, 0.0, 499)), only).status == "not_judged"
 
 
-def test_a_maximum_decides_nothing() -> None:
+def test_the_largest_value_alone_is_not_judged() -> None:
     run = noisy.clean(1, 2500, "fifo")
     run.columns["latency"]["round_trip"][7] = 10.0
     assert verdict(run).status == "within"

@@ -1,4 +1,4 @@
-"""The view as a process beside a test: it says where it is, shows the end, and where it fails only says so."""
+"""The live view as a process beside a test: it prints its address, shows the end, and cannot stop the test."""
 
 from __future__ import annotations
 

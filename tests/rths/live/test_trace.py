@@ -1,4 +1,4 @@
-"""Thinning: how many points are kept, which ones, and what is new to a reader."""
+"""Thinning of a line: how many points are kept, which ones, and which are new to a reader."""
 
 from __future__ import annotations
 

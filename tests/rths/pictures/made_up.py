@@ -1,4 +1,4 @@
-"""Recordings whose content is known in closed form."""
+"""Made-up recordings whose content is known in closed form."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def test_the_page_shows_every_picture_with_its_text(reported: Path) -> None:
 
 
 @pytest.mark.slow
-def test_in_a_browser(reported: Path, tmp_path: Path) -> None:
+def test_the_page_is_drawn_in_a_browser(reported: Path, tmp_path: Path) -> None:
     check_in_browser(reported, tmp_path)
 
 

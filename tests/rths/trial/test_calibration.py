@@ -19,7 +19,7 @@ def test_wilson_agrees_with_scipy(n: int, share: float, level: float) -> None:
     assert calibration.wilson(successes, n, level) == pytest.approx((wanted.low, wanted.high), abs=1e-12)
 
 
-def test_no_cases_are_refused() -> None:
+def test_a_calibration_without_cases_is_refused() -> None:
     with pytest.raises(InputError):
         calibration.wilson(0, 0)
     with pytest.raises(InputError):

@@ -1,4 +1,4 @@
-"""Cases: the same for the same seed, two sets apart, truths inside tolerances, effects between their sizes."""
+"""Cases: the same for the same seed, other ones in other sets, with truths and effects in their ranges."""
 
 from __future__ import annotations
 

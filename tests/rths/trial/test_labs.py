@@ -1,4 +1,4 @@
-"""The independent laboratories: clean ones against SciPy, every effect by size, sign and the signals it moves."""
+"""The independent laboratories: clean ones against SciPy, every effect by size, sign and the signals it changes."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def test_there_is_a_meaning_for_each() -> None:
     assert [name.lower() for name in MEANINGS] == list(Criteria._fields)
 
 
-def test_nothing_apart_reads_nothing() -> None:
+def test_equal_signals_make_all_criteria_zero() -> None:
     x = wave()
     floors = np.stack([x, 2.0 * x, 3.0 * x], axis=1)
     assert criteria(x, x, floors, floors, INTERVAL) == Criteria(*[0.0] * 9)

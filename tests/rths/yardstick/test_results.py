@@ -1,4 +1,4 @@
-"""What the benchmark finds, beside what is published."""
+"""The results of the benchmark, compared with published ones."""
 
 from __future__ import annotations
 

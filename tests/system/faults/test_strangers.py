@@ -1,4 +1,4 @@
-"""What strangers on the master's port can cost: connections that say nothing, and messages larger than any of ours."""
+"""Strangers on the master's port: connections that send nothing, and messages larger than any of this system's."""
 
 from __future__ import annotations
 
