@@ -17,6 +17,7 @@ from common.plan.tables import Limits
 from common.protocol.exchange import Event
 from common.protocol.messages import Command
 from common.rig import ColumnCommand, ColumnMeasurement, TableCommand, TableMeasurement
+from common.roles import BUILDING
 from common.safety.modes import TURNS, Mode, Turn
 from common.signals import OF_STOREYS, SENT
 from docs import generate
@@ -38,6 +39,7 @@ BY_CONSTANT = {
     preflight.SENSORS,
     preflight.LINK,
     preflight.RIG,
+    BUILDING,
     preflight.ACCEPTED,
 }
 
