@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Sequence
+from datetime import date
 
 from common.foreign import PATIENCE_S, file_of
 from common.host.clock import real, unix_ns
 from common.lab.laboratory import Setting
-from common.lab.preflight import Gate, PreflightCheck
+from common.lab.preflight import Gate, PreflightCheck, calibration_checks
 from common.plan.plan import Plan
 from common.reality.reality import Reality
 from common.rig import AtRest, GuardedRig
@@ -34,7 +35,11 @@ from models.system import System
 
 def preflight(plan: Plan) -> list[PreflightCheck]:
     """The checks of the plan by nominal models; raises InputError where a model or parameter is not valid."""
+<<<<<<< HEAD
     return [*nominal.checks(plan), *foreign.checked(plan)]
+=======
+    return [*nominal.checks(plan), *calibration_checks(plan, date.today())]
+>>>>>>> e10b1cd (A report that can be filed: laboratory, operator and calibration in the plan, and a PDF; slips of units are judged by strict limits)
 
 
 def build_rig(reality: Reality, at_rest: AtRest | None = None, *, paced: bool = False) -> GuardedRig:

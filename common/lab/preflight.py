@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from datetime import date
 from typing import NamedTuple
 
 from common.errors import RigError
 from common.lab.laboratory import Laboratory, Setting
+from common.plan.calibration import overdue
 from common.plan.plan import Plan
 from common.safety.risks import Risk, known
 from common.udp import probe
@@ -29,10 +31,11 @@ SENSORS_PASSED = "Sensor check at rest: passed"
 
 
 class PreflightCheck(NamedTuple):
-    """What was checked, in words with its figures, and the risk that was found."""
+    """What was checked, in words with its figures, and the risk that was found; a `warning` refuses nothing."""
 
     text: str
     risk: Risk | None = None
+    warning: bool = False
 
 
 class RefusedError(RigError):
@@ -68,7 +71,7 @@ class Gate:
     def __init__(self, accepted: Collection[str] = ()) -> None:
         self.accepted = known(accepted)
         self.overruled: list[Risk] = []
-        self.passed: list[tuple[str, str]] = []  # code of the event, and its text
+        self.passed: list[tuple[str, str, str]] = []  # code of the event, its text and its level
 
     def judge(self, checks: Iterable[PreflightCheck], code: str = PASSED) -> None:
         """Take the results of checks; raises RefusedError where a risk was found that is not accepted."""
@@ -77,15 +80,24 @@ class Gate:
         if refusing:
             raise refusal(refusing)
         self.overruled += overruled
-        self.passed += [(code, f"pre-flight: {one.text}.") for one in made if one.risk is None]
+        self.passed += [
+            (code, f"pre-flight: {one.text}.", "warning" if one.warning else "info")
+            for one in made
+            if one.risk is None
+        ]
 
     def note(self, lab: Laboratory) -> None:
         """Record and report each check that was passed and each risk that was accepted, once."""
-        for code, text in self.passed:
-            lab.note(code, text)
+        for code, text, level in self.passed:
+            lab.note(code, text, level=level)
         for risk in self.overruled:
             lab.note(ACCEPTED, f"risk '{risk.name}' accepted: {risk.sentence}.", level="warning")
         self.passed, self.overruled = [], []
+
+
+def calibration_checks(plan: Plan, today: date) -> list[PreflightCheck]:
+    """A warning for each sensor of the plan whose calibration holds no longer on that day."""
+    return [PreflightCheck(text, warning=True) for text in overdue(plan, today)]
 
 
 # -- link -----------------------------------------------------------------------------------------

@@ -34,6 +34,7 @@ from common.plan.tables import (
     Link,
     Preflight,
     RecordingTable,
+    ReportTable,
     SafetyTable,
     SensorsTable,
     Structure,
@@ -76,6 +77,7 @@ class Plan:
     master: LaboratoryTable = LaboratoryTable()
     slave: LaboratoryTable = LaboratoryTable()
     recording: RecordingTable = RecordingTable()
+    report: ReportTable = ReportTable()
     slaves: dict[str, SlaveLaboratory] = field(default_factory=dict)
     base: Path = Path()
     follows_in: str = field(default=FOLLOWS_IN, compare=False)
@@ -197,7 +199,13 @@ class Plan:
                 del lab["kind"]
         if self.device == DeviceTable():
             del tables["device"]
+<<<<<<< HEAD
         for name in unsaid(self):
+=======
+        if self.report == ReportTable():
+            del tables["report"]
+        for name in CLIENT if not self.served else ():
+>>>>>>> e10b1cd (A report that can be filed: laboratory, operator and calibration in the plan, and a PDF; slips of units are judged by strict limits)
             del tables["structure"][name]
         return tables
 
@@ -220,14 +228,15 @@ class Plan:
         return tomli_w.dumps(self.written())
 
     def digest(self) -> str:
-        """Sixteen hex digits, equal for two plans that describe the same test; [recording] is left out of them."""
-        tables = {name: table for name, table in self.tables().items() if name != "recording"}
+        """Sixteen hex digits, equal for two plans that describe the same test, whatever is recorded and reported."""
+        tables = {name: table for name, table in self.tables().items() if name not in UNTESTED}
         if self.slaves:
             tables["order"] = list(self.slaves)  # recorded values per slave stand in this order
         text = json.dumps(tables, sort_keys=True)
         return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
+<<<<<<< HEAD
 def unsaid(plan: Plan) -> tuple[str, ...]:
     """The keys of [structure] that do not apply to what computes the building."""
     if plan.foreign:
@@ -235,6 +244,10 @@ def unsaid(plan: Plan) -> tuple[str, ...]:
     return ("options",) if plan.served else ("model", "options", "intervals")
 
 
+=======
+UNTESTED = ("recording", "report")  # tables that do not describe the test
+CLIENT = ("model", "intervals")  # keys of [structure] that say that a client has the building
+>>>>>>> e10b1cd (A report that can be filed: laboratory, operator and calibration in the plan, and a PDF; slips of units are judged by strict limits)
 BESIDE = ("slaves", "base", "follows_in", "eased")  # fields that are not tables of a file
 TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in BESIDE)
 INTERFACE = tuple(dict.fromkeys(name for names in TABLES_OF_KIND.values() for name in names))

@@ -15,7 +15,7 @@ from importlib import metadata
 from typing import Any
 
 from common.plan.patience import strict
-from common.plan.plan import Plan
+from common.plan.plan import UNTESTED, Plan
 from common.protocol.codec import MOST_TEXT
 
 MOST_KEYS = 6  # named in one sentence, which then takes about five lines of a terminal
@@ -48,7 +48,7 @@ def changed(plan: Plan) -> dict[str, str]:
     given = {name: text for name, text in own.items() if defaults.get(name) != text}
     given |= dict.fromkeys(defaults.keys() - own.keys(), "null")
     return {VERSION: metadata.version("rths")} | {
-        name: text for name, text in given.items() if not name.startswith("recording.")
+        name: text for name, text in given.items() if name.partition(".")[0] not in UNTESTED
     }
 
 

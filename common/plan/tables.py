@@ -259,6 +259,20 @@ class Tolerances:
 
 
 @dataclass(frozen=True)
+class ReportTable:
+    """What reports say of a test beside its data; it does not change the test."""
+
+    laboratory: str = key("name of the laboratory", default="")
+    operator: str = key("who runs the test", default="")
+    specimen: str = key("what is tested", default="")
+    notes: str = key("anything else that a report shall say", default="")
+    calibration: dict[str, Any] = key(
+        "calibration of each sensor by its signal: date, due (until when it holds), by, certificate",
+        default={},
+    )
+
+
+@dataclass(frozen=True)
 class RecordingTable:
     """Where recordings go, and whether a test may run without one."""
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 from common.lab.preflight import PreflightCheck
+from common.plan.calibration import overdue
 from common.plan.kinds import COLUMN, TABLE
 from common.plan.plan import Plan
 from common.roles import MASTER
@@ -48,6 +50,7 @@ def facts(plan: Plan, file: Path) -> dict[str, Any]:
         "recording": {"bytes": round(space.need(plan)), "folder": plan.recording.folder},
         "classes": [one._asdict() for one in classes.named(plan)],
         "rigs": rigs_there,
+        "calibration": list(overdue(plan, date.today())),
         "slips": [one._asdict() for one in slips.slips(plan, motion, found)],
         "refused": [*(risk(one) for one in made if one.risk), *refusing],
         "ready": not refusing and not any(one.risk for one in made),

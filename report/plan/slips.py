@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from common.plan.kinds import COLUMN
+from common.plan.patience import strict
 from common.plan.plan import Plan
 from common.roles import MASTER
 from loop.nominal.partition import felt, matrices, taken_over
@@ -59,8 +60,8 @@ def slips(plan: Plan, motion: GroundMotion, found: Findings) -> list[PlanSlip]:
         *damping_slips(float(modes.damping_ratios[0])),
         *specimen_slip(plan),
         *transfer_slips(plan),
-        *sensor_slips(plan),
-        *limit_slips(plan, found),
+        *sensor_slips(strict(plan)),
+        *limit_slips(strict(plan), found),
     ]
 
 

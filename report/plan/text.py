@@ -142,6 +142,8 @@ def concerns(facts: Mapping[str, Any]) -> Iterator[str]:
     yield from code(facts["classes"], emulated=not facts["rigs"])
     for slip in facts["slips"]:
         yield f"a slip of units? {slip['where']}: {slip['text']}"
+    for text in facts["calibration"]:
+        yield f"{text[0].upper()}{text[1:]}: calibrate the sensor, or correct the date in the plan."
     for risk in facts["refused"]:
         yield f"pre-flight would refuse ({risk['name']}): {risk['sentence']}."
     if facts["ready"]:

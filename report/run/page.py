@@ -34,6 +34,7 @@ def page(run: Run, summary: Summary, drawn: Pictures, left_out: dict[str, str]) 
         exchange=tables.exchange(summary),
         rejected=tables.rejected(summary),
         machines=tables.machines(run),
+        calibration=tables.calibration(run),
         preflight=tables.events(run, *BEFORE),
         events=tables.events(run),
         plan=run.metadata.get("plan", {}).get("toml", ""),

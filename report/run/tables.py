@@ -8,6 +8,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from common.plan.calibration import Calibration, calibrations, day
 from common.recording.outcome import outcome
 from common.recording.run import CLOCK, GROUND, MACHINES, Run
 from common.roles import MASTER, name_of
@@ -19,6 +20,12 @@ from report.text.terminal import TitledTable
 
 EVENTS = 400  # rows on the page, which stays below a megabyte; JSON of rths inspect has all
 SHOWN = ("plan", CLOCK, GROUND, MACHINES)  # metadata that have a section of their own
+SAID = (
+    "laboratory",
+    "operator",
+    "specimen",
+    "notes",
+)  # keys of [report] that stand beside the facts of the test
 
 
 def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:
@@ -39,6 +46,7 @@ def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:
         ("slaves", ", ".join(summary["slaves"])),
         ("part tested", run.metadata.get("bench", {}).get("part", "")),
         ("outcome", outcome(ended)),
+        *(((name, getattr(plan.report, name)) for name in SAID) if plan else ()),
     ]
     return [(name, text) for name, text in found if text]
 
@@ -53,6 +61,30 @@ def date(run: Run) -> str:
     except (ValueError, OverflowError):
         return ""
     return f"{at:%Y-%m-%d %H:%M:%S} UTC"
+
+
+def calibration(run: Run) -> TitledTable:
+    """The calibration of each sensor, and whether it held when the recording was begun."""
+    plan, begun = plan_of(run), day(date(run)[:10])
+    found = calibrations(plan) if plan else []
+    rows = [
+        [
+            one.signal,
+            *map(str, (one.calibrated or MISSING, one.due or MISSING)),
+            held(one, begun),
+            one.by or MISSING,
+            one.certificate or MISSING,
+        ]
+        for one in found
+    ]
+    return TitledTable("", ("sensor", "calibrated", "due", "held in the test", "by", "certificate"), rows)
+
+
+def held(one: Calibration, begun: datetime.date | None) -> str:
+    """Whether a calibration held on a day."""
+    if one.due is None or begun is None:
+        return MISSING
+    return "no" if one.due < begun else "yes"
 
 
 COUNTS = ("expected", "recorded", "missing", "repeated")

@@ -7,6 +7,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
+from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from common.errors import InputError, RthsError
 from common.host import running
 from common.host.realtime import assign, freeze
 from common.host.stopping import Stopper
-from common.lab.preflight import Gate, PreflightCheck
+from common.lab.preflight import Gate, PreflightCheck, calibration_checks
 from common.plan.plan import Plan
 from common.reality.reality import Reality
 from common.roles import MASTER, RECORDER
@@ -158,7 +159,11 @@ def checks(plan: Plan, output: Path, *, paced: bool = True) -> list[PreflightChe
     from recorder import space
 
     nominal = [] if plan.served else preflight.checks(plan)
+<<<<<<< HEAD
     return [*nominal, *foreign.checked(plan, paced=paced), space.check(plan, output.parent)]
+=======
+    return [*nominal, *calibration_checks(plan, date.today()), space.check(plan, output.parent)]
+>>>>>>> e10b1cd (A report that can be filed: laboratory, operator and calibration in the plan, and a PDF; slips of units are judged by strict limits)
 
 
 def virtual_report(working: Working, kind: str, data: Any) -> None:
