@@ -35,11 +35,7 @@ from models.system import System
 
 def preflight(plan: Plan) -> list[PreflightCheck]:
     """The checks of the plan by nominal models; raises InputError where a model or parameter is not valid."""
-<<<<<<< HEAD
-    return [*nominal.checks(plan), *foreign.checked(plan)]
-=======
-    return [*nominal.checks(plan), *calibration_checks(plan, date.today())]
->>>>>>> e10b1cd (A report that can be filed: laboratory, operator and calibration in the plan, and a PDF; slips of units are judged by strict limits)
+    return [*nominal.checks(plan), *foreign.checked(plan), *calibration_checks(plan, date.today())]
 
 
 def build_rig(reality: Reality, at_rest: AtRest | None = None, *, paced: bool = False) -> GuardedRig:

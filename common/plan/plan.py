@@ -199,13 +199,9 @@ class Plan:
                 del lab["kind"]
         if self.device == DeviceTable():
             del tables["device"]
-<<<<<<< HEAD
-        for name in unsaid(self):
-=======
         if self.report == ReportTable():
             del tables["report"]
-        for name in CLIENT if not self.served else ():
->>>>>>> e10b1cd (A report that can be filed: laboratory, operator and calibration in the plan, and a PDF; slips of units are judged by strict limits)
+        for name in unsaid(self):
             del tables["structure"][name]
         return tables
 
@@ -236,7 +232,9 @@ class Plan:
         return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
-<<<<<<< HEAD
+UNTESTED = ("recording", "report")  # tables that do not describe the test
+
+
 def unsaid(plan: Plan) -> tuple[str, ...]:
     """The keys of [structure] that do not apply to what computes the building."""
     if plan.foreign:
@@ -244,10 +242,6 @@ def unsaid(plan: Plan) -> tuple[str, ...]:
     return ("options",) if plan.served else ("model", "options", "intervals")
 
 
-=======
-UNTESTED = ("recording", "report")  # tables that do not describe the test
-CLIENT = ("model", "intervals")  # keys of [structure] that say that a client has the building
->>>>>>> e10b1cd (A report that can be filed: laboratory, operator and calibration in the plan, and a PDF; slips of units are judged by strict limits)
 BESIDE = ("slaves", "base", "follows_in", "eased")  # fields that are not tables of a file
 TABLES = tuple(name for name in Plan.__dataclass_fields__ if name not in BESIDE)
 INTERFACE = tuple(dict.fromkeys(name for names in TABLES_OF_KIND.values() for name in names))

@@ -62,12 +62,9 @@ def from_tables(tables: dict[str, Any], base: Path) -> Plan:
     given = {name: fill(types[name], tables[name], name) for name in tables if name != "slave" or not slaves}
     if "structure" in given:
         given["structure"] = building.with_modal_damping(given["structure"], tables["structure"])
-<<<<<<< HEAD
         building.check_model(given["structure"], tables["structure"])
-=======
     if "report" in given:
         given["report"] = calibration.checked(given["report"])
->>>>>>> e10b1cd (A report that can be filed: laboratory, operator and calibration in the plan, and a PDF; slips of units are judged by strict limits)
     plan = Plan(base=base, **given)
     plan = replace(plan, slaves={name: slave_laboratory(plan, name, slaves[name]) for name in slaves})
     check_laboratories(plan)

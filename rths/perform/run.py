@@ -159,11 +159,8 @@ def checks(plan: Plan, output: Path, *, paced: bool = True) -> list[PreflightChe
     from recorder import space
 
     nominal = [] if plan.served else preflight.checks(plan)
-<<<<<<< HEAD
-    return [*nominal, *foreign.checked(plan, paced=paced), space.check(plan, output.parent)]
-=======
-    return [*nominal, *calibration_checks(plan, date.today()), space.check(plan, output.parent)]
->>>>>>> e10b1cd (A report that can be filed: laboratory, operator and calibration in the plan, and a PDF; slips of units are judged by strict limits)
+    others = [*foreign.checked(plan, paced=paced), *calibration_checks(plan, date.today())]
+    return [*nominal, *others, space.check(plan, output.parent)]
 
 
 def virtual_report(working: Working, kind: str, data: Any) -> None:
