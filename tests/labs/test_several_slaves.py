@@ -20,7 +20,6 @@ from common.plan.read import from_tables, with_test
 from common.protocol.exchange import State
 from common.protocol.messages import Arm, Feedback, Recorder, Register, Start, Sync, Waiting
 from common.reality import reality
-from common.reality.reality import Reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.terminal import cli
@@ -29,9 +28,9 @@ from loop.closed_loop import simulate
 from loop.signals import signals
 from rths.examine.replay import planned, replay_master, replay_slaves
 from simulation import virtual
-from simulation.virtual import VirtualTest
 from slave.assembly import build_loop as build_slave
 from tests.helpers import largest, running, without_recorder
+from tests.labs.played import run
 
 THREE = {"mass": [1.6e5] * 3, "stiffness": [9e7] * 3, "damping": [4e5] * 3}
 
@@ -54,12 +53,6 @@ def tall(*names: str, duration: float = 2.0) -> Plan:
 
 
 TWO = tall("roof", "middle")
-
-
-def run(chosen: Plan, path: Path, real: Reality | None = None) -> tuple[Run, Any, VirtualTest]:
-    bench = virtual.assemble(chosen, real or reality.as_planned(chosen), path)
-    error = virtual.run(bench, lambda: "")
-    return read(path), error, bench
 
 
 @pytest.fixture(scope="module")
