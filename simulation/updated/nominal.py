@@ -136,7 +136,7 @@ def differences(before: Plan, after: Plan) -> list[str]:
             ]
         said = text(one), text(other)
         if one is None:
-            return [f"{path}: {said[1]}, which the plan does not have"]
+            return [f"{path}: none → {said[1]}"]
         return [f"{path}: {said[0]} → {said[1]}"] if said[0] != said[1] else []
 
     return rows("", before.tables(), after.tables())

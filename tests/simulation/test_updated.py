@@ -104,7 +104,7 @@ def test_only_the_first_of_two_laws_of_a_column_is_said() -> None:
     ]
     updated = nominal.update(FoundLaboratories(from_reality({"effect": laws}, plan, Path()), Spread()), plan)
     assert updated.plan.column.model == "bouc_wen"
-    assert "column.yield_displacement: 0.001, which the plan does not have" in updated.said
+    assert "column.yield_displacement: none → 0.001" in updated.said
     assert [sentence.split()[0] for sentence in updated.unsaid] == ["column.self_centring"]
 
 
