@@ -66,9 +66,7 @@ class MessagesUsed(NamedTuple):
 class Rollout(NamedTuple):
     """The result of a simulation: signals by name, one row per tick, up to where the loop diverged."""
 
-    master: dict[
-        str, Array
-    ]  # (ticks,); of several storeys (ticks, storeys), of several slaves (ticks, slaves)
+    master: dict[str, Array]  # (ticks,); with a second axis for several storeys or several slaves
     slaves: dict[str, dict[str, Array]]  # by role, (ticks,) each: command of the transfer system, measured
     exchange: dict[str, MessagesUsed]  # by role of the slave
     finite: bool  # False if the loop diverged
