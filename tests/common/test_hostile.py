@@ -7,79 +7,29 @@ import re
 import struct
 import threading
 import tracemalloc
-from collections.abc import Callable
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, get_type_hints
 
 import msgpack
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from common.link.endpoint import ALLOWED, CHANNELS, LARGEST, OPEN, SPOKEN, FrameEndpoint, channel_of
+from common.link.endpoint import CHANNELS, LARGEST, OPEN
 from common.link.rejections import NEWS_NS, RejectionCount, Rejections
-from common.link.transport import CONTROL, SAMPLES, TICK, Packet
+from common.link.transport import CONTROL, TICK
 from common.protocol import codec
 from common.protocol.codec import MESSAGES, MOST_TEXT, Reject, RejectedFrame, decode, encode, session_key
 from common.protocol.messages import (
     MOST_CHANNELS,
-    Arm,
     Command,
-    Feedback,
     Message,
-    Recorder,
-    Refused,
-    Register,
-    Registered,
-    Samples,
-    Start,
     Stop,
     Trip,
-    Waiting,
 )
-from common.roles import MASTER, RECORDER, SLAVE
+from common.roles import MASTER, SLAVE
+from tests.common.listener import GOOD, SESSION, end
 from tests.common.test_codec import COMMAND, KEY, framed, messages_of
 from tests.helpers import ROOT
-
-SESSION = 7
-FEEDBACK = Feedback(SESSION, 3, 2, 11, 2, 11, 12, 13, (0.001, 0.1, 0.002, 12.5))
-REST = (0.0, 0.0, 0.0)
-
-
-class Wire:
-    """Stands in for a link: what is heard is what a test hands to `hear`."""
-
-    def __init__(self) -> None:
-        self.hear: Callable[[Packet], None] = lambda _: None
-        self.sent: list[tuple[str, bytes]] = []
-
-    def send(self, channel: str, frame: bytes, to: str = "") -> None:
-        self.sent.append((channel, frame))
-
-    def listen(self, heard: Callable[[Packet], None]) -> None:
-        self.hear = heard
-
-    def close(self) -> None:
-        pass
-
-
-class End(NamedTuple):
-    """An endpoint and the link it hears."""
-
-    endpoint: FrameEndpoint
-    wire: Wire
-
-    def hears(self, role: str, channel: str, frame: bytes, at: int = 1) -> Message | None:
-        """What the endpoint makes of a frame."""
-        self.wire.hear(Packet(role, channel, frame, at))
-        received = self.endpoint.receive()
-        return received.message if received else None
-
-
-def end(session: int = SESSION) -> End:
-    wire = Wire()
-    endpoint = FrameEndpoint(wire, "plan")
-    endpoint.enter(session)
-    return End(endpoint, wire)
 
 
 def command(*fields: object) -> list[object]:
@@ -96,18 +46,7 @@ def bare(content: object) -> bytes:
     return packed
 
 
-@pytest.mark.parametrize(("channels", "heard"), [(4, True), (2, False)])
-def test_a_feedback_has_as_many_channels_as_its_slave(channels: int, heard: bool) -> None:
-    master = end()
-    master.endpoint.expect({SLAVE: 4})
-    frame = encode(FEEDBACK._replace(measured=FEEDBACK.measured[:channels]), KEY)
-    assert (master.hears(SLAVE, TICK, frame) is not None) == heard
-    assert master.endpoint.rejected == ({} if heard else {"fields": 1})
-
-
-GOOD = encode(COMMAND, KEY)
 BODY = GOOD[:-8]
-
 # payloads that a sender with the right key could send, and why each is none
 CONTENTS: dict[str, tuple[bytes, str]] = {
     "nothing at all": (b"", "length"),
@@ -226,101 +165,6 @@ def test_whatever_a_rig_says_its_message_arrives(text: str) -> None:
     assert len(message.text) == min(len(text), MOST_TEXT)
 
 
-# -- who may say what, where, under which key --------------------------------------------------------
-
-
-def test_every_kind_is_spoken_by_somebody() -> None:
-    assert frozenset().union(*SPOKEN.values()) == set(MESSAGES)
-
-
-@pytest.mark.parametrize("role", [MASTER, SLAVE, RECORDER, "operator", "stranger"])
-@pytest.mark.parametrize("channel", [TICK, CONTROL, SAMPLES])
-def test_what_a_role_does_not_say_on_a_channel_is_not_heard(role: str, channel: str) -> None:
-    other = end()
-    for kind in MESSAGES:
-        session = 0 if kind is Recorder else SESSION
-        hints = get_type_hints(kind)
-        fields = {name: hints[name]() for name in kind._fields} | {"session": session}
-        fields |= {"measured": (0.0,)} if "measured" in fields else {}
-        if "lab" in fields:
-            fields["lab"] = role
-        frame = encode(kind(**fields), KEY)
-        heard = other.hears(role, channel, frame) is not None
-        assert heard == (kind in SPOKEN.get(role, ()) and channel_of(kind) == channel)
-    expected = len(MESSAGES) - len(ALLOWED.get((role, channel), ()))
-    assert other.endpoint.rejected == {"kind_not_allowed": expected}
-
-
-def test_a_named_slave_speaks_as_a_slave() -> None:
-    master = end()
-    assert master.hears("slave.roof", TICK, encode(FEEDBACK, KEY)) == FEEDBACK
-    assert master.hears("slave.roof", TICK, GOOD) is None
-    assert master.endpoint.rejected == {"kind_not_allowed": 1}
-
-
-def test_nobody_speaks_for_another() -> None:
-    recorder = end()
-    assert recorder.hears(MASTER, SAMPLES, encode(Samples(SESSION, SLAVE, 0, b""), KEY)) is None
-    assert recorder.hears("slave.roof", CONTROL, encode(Trip(SESSION, "slave.cellar", "", ""), KEY)) is None
-    assert recorder.endpoint.rejected == {"sender": 2}
-
-
-def test_within_a_session_only_what_must_be_open_comes_under_the_key_that_all_share() -> None:
-    shared = session_key(0, "")
-    keyed: list[tuple[Message, str]] = [
-        (Start(SESSION, 1, 1), MASTER),
-        (Stop(SESSION, 1, ""), MASTER),
-        (Trip(SESSION, MASTER, "", ""), MASTER),
-        (Registered(SESSION, 1), SLAVE),
-        (Recorder(SESSION, "failed", "plan", "the disk is full.", b""), RECORDER),
-    ]
-    opened: list[tuple[Message, str]] = [
-        (Register(9, 4, "plan"), MASTER),
-        (Arm(SESSION, 1), MASTER),
-        (Waiting(0, 1), SLAVE),
-        (Refused(SESSION, "another plan."), SLAVE),
-        (Recorder(0, "ready", "plan", "", b""), RECORDER),
-    ]
-    for message, role in keyed:
-        one = end()
-        assert one.hears(role, CONTROL, encode(message, shared)) is None
-        assert one.endpoint.rejected == {"open_key": 1}
-        assert one.hears(role, CONTROL, encode(message, KEY)) == message
-    for message, role in opened:
-        assert type(message) in OPEN
-        for session in (SESSION, 0):
-            assert end(session).hears(role, CONTROL, encode(message, shared)) == message
-
-
-def test_who_has_no_session_is_not_disturbed_by_those_of_others() -> None:
-    idle = end(session=0)
-    for channel, message in ((TICK, COMMAND), (CONTROL, Stop(SESSION, 1, ""))):
-        assert idle.hears(MASTER, channel, encode(message, KEY)) is None
-    assert idle.endpoint.rejected == {"unregistered": 2}
-    assert idle.endpoint.news(10 * NEWS_NS) is None
-    assert idle.hears(MASTER, TICK, encode(COMMAND, session_key(0, ""))) is None
-    assert idle.endpoint.rejected["open_key"] == 1
-
-
-def test_what_is_sent_is_under_the_sessions_key_but_for_what_must_be_open() -> None:
-    for message, keyed in (
-        (Stop(SESSION, 1, ""), True),
-        (Registered(SESSION, 1), True),
-        (Refused(SESSION, "no rig."), True),
-        (Recorder(SESSION, "recording", "", "", b""), True),
-        (Refused(SESSION + 1, "it takes part in another test already."), False),
-        (Register(SESSION, 4, ""), False),
-        (Arm(SESSION, 1), False),
-    ):
-        one = end()
-        one.endpoint.send(message)
-        ((_, frame),) = one.wire.sent
-        assert decode(frame, KEY if keyed else session_key(0, "")) == message
-
-
-# -- counting -----------------------------------------------------------------------------------------
-
-
 def test_rejections_are_told_at_most_once_a_second_with_totals_and_what_is_new() -> None:
     found = Rejections()
     assert found.news(0) is None
@@ -364,9 +208,6 @@ def test_no_rejection_is_lost_between_threads() -> None:
     assert found.counts["check"] == 8_000
 
 
-# -- bounds -------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("unit", [b"\x90", b"\x80", b"\x91", b"\xc0", b"\xa0", b"\xca\x00\x00\x00\x00"])
 def test_hostile_content_takes_memory_in_proportion_to_a_bounded_frame(unit: bytes) -> None:
     largest = LARGEST[CONTROL]
@@ -400,10 +241,7 @@ def test_the_largest_message_of_numbers_fits_its_channel(kind: type[Any]) -> Non
     assert len(encode(kind(*fields), KEY)) <= LARGEST[CHANNELS.get(kind, CONTROL)]
 
 
-# -- properties ---------------------------------------------------------------------------------------
-
 ANY_MESSAGE = st.sampled_from(MESSAGES).flatmap(messages_of)
-
 PLAIN = (
     st.none()
     | st.booleans()
@@ -472,9 +310,6 @@ def test_a_valid_message_flipped_cut_or_stuffed(message: Message, data: st.DataO
             case _:
                 payload = payload[place:] + payload[:place]
     is_message_or_rejected(signed(bytes(payload)))
-
-
-# -- documentation ------------------------------------------------------------------------------------
 
 
 def test_the_documentation_has_every_reason_once_in_the_order_of_the_enum() -> None:
