@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from common.errors import InputError
@@ -19,81 +18,35 @@ from common.recording.reader import read
 from common.rig import ColumnCommand, TableCommand
 from rths.__main__ import main
 from tests.helpers import ROOT
+from tests.rths.trial.played_labs import (
+    CLEAN,
+    COLUMN,
+    DT,
+    KNOWN_A,
+    KNOWN_B,
+    MOTOR,
+    SIGNALS_A,
+    SIGNALS_B,
+    TABLE,
+    TIMES,
+    Trace,
+    changes,
+    effect,
+    near,
+    play,
+    play_a,
+    play_b,
+    ramped,
+)
 from validation.blind.labs import (
     FORMULAS,
     PLAIN,
     SIGNALS,
     UNCATALOGUED,
-    column_effects,
     laying,
-    sensors,
-    table_effects,
 )
 from validation.blind.labs.column_lab import TrueColumnLab
 from validation.blind.labs.table_lab import TrueTableLab
-
-DT = 0.002
-Trace = NDArray[np.float64]
-SILENT = dict.fromkeys(SIGNALS, 0.0)
-SIGNALS_A, SIGNALS_B = SIGNALS[:2], SIGNALS[2:]
-KNOWN_A = {**column_effects.KNOWN, **sensors.known(SIGNALS_A)}
-KNOWN_B = {**table_effects.KNOWN, **sensors.known(SIGNALS_B)}
-
-# a command of several frequencies that begins at rest, with about the amplitudes of the default test
-TIMES = np.arange(2500) * DT
-RISE = np.minimum(TIMES / 2.0, 1.0) ** 2
-COLUMN = RISE * (2.2e-3 * np.sin(12.5 * TIMES) + 0.1e-3 * np.sin(40.0 * TIMES))
-TABLE = RISE * (4.5e-3 * np.sin(12.5 * TIMES) + 0.2e-3 * np.sin(40.0 * TIMES))
-MOTOR = RISE * (60.0 * np.cos(12.5 * TIMES) + 4.0 * np.sin(31.0 * TIMES))
-
-
-def effect(name: str, formula: str = "", /, **parameters: float) -> dict[str, Any]:
-    return {"name": name, "formula": formula, "parameters": parameters}
-
-
-def play_a(*effects: dict[str, Any], command: Trace = COLUMN, **options: Any) -> dict[str, Trace]:
-    lab = TrueColumnLab(DT, 3, **{"sensors": SILENT, "effects": list(effects)} | options)
-    rows = []
-    for value in command.tolist():
-        rows.append(lab.read())
-        lab.write(ColumnCommand(value))
-    return dict(zip(SIGNALS_A, np.array(rows).T, strict=True))
-
-
-def play_b(
-    *effects: dict[str, Any], command: Trace = TABLE, motor: Trace = MOTOR, **options: Any
-) -> dict[str, Trace]:
-    lab = TrueTableLab(DT, 3, **{"sensors": SILENT, "effects": list(effects)} | options)
-    rows = []
-    for pair in zip(command.tolist(), motor.tolist(), strict=True):
-        rows.append(lab.read())
-        lab.write(TableCommand(*pair))
-    return dict(zip(SIGNALS_B, np.array(rows).T, strict=True))
-
-
-def play(*effects: dict[str, Any]) -> dict[str, Trace]:
-    names = {item["name"] for item in effects}
-    return play_a(*effects) if names <= set(KNOWN_A) else play_b(*effects)
-
-
-CLEAN = {**play_a(), **play_b()}
-
-
-def changes(found: dict[str, Trace]) -> dict[str, float]:
-    """Rms of the change of each signal over the clean one's."""
-    return {
-        name: float(np.sqrt(np.mean((values - CLEAN[name]) ** 2) / np.mean(CLEAN[name] ** 2)))
-        for name, values in found.items()
-    }
-
-
-def near(found: Trace, wanted: Trace, tolerance: float = 1e-4) -> bool:
-    return float(np.max(np.abs(found - wanted))) < tolerance * float(np.max(np.abs(wanted)))
-
-
-def ramped(command: Trace, t: float) -> float:
-    """The command ramped so that value k arrives at t = (k + 1)·dt, as a rig does that is written at tick k."""
-    return float(np.interp(t, np.arange(command.size + 1) * DT, np.concatenate([[0.0], command])))
 
 
 def test_a_clean_laboratory_a_is_the_nominal_model() -> None:
@@ -254,182 +207,6 @@ def test_sizes_outside_the_catalogue_are_seen_and_bearable(name: str, end: int) 
     ]
     assert max(ratios) > (0.2, 2.0)[end]
     assert max(changes(found).values()) < 1.0
-
-
-def test_forces_resist_motion_and_deformation() -> None:
-    x = CLEAN["column_displacement"]
-    v = np.gradient(x, DT)
-    for name, formula, parameters in (
-        ("column.friction", "tanh", {"force": 1000.0}),
-        ("column.friction", "dahl", {"force": 1000.0}),
-        ("column.friction", "lugre", {"force": 1000.0}),
-    ):
-        extra = play_a(effect(name, formula, **parameters))["column_force"] - CLEAN["column_force"]
-        fast = np.abs(v) > 0.01
-        assert np.allclose(extra[fast], np.sign(v[fast]) * 1000.0, rtol=0.03), formula
-    extra = play_a(effect("column.viscous", coefficient=5e4))["column_force"] - CLEAN["column_force"]
-    assert np.mean(extra * v) > 0.0
-    assert np.interp(0.02, *paired(v, extra)) == pytest.approx(1000.0, rel=0.03)
-    extra = play_a(effect("column.inertia", mass=1000.0))["column_force"] - CLEAN["column_force"]
-    assert np.corrcoef(extra[500:], np.gradient(v, DT)[500:])[0, 1] > 0.95
-    extra = play_a(effect("column.hardening", share=0.1))["column_force"] - CLEAN["column_force"]
-    y = x / 2e-3
-    assert np.allclose(extra, 0.6 * 12.5e6 * 2e-3 * (np.sinh(y) - y), atol=0.1)
-    extra = play_a(effect("x.column.asymmetry", share=0.1))["column_force"] - CLEAN["column_force"]
-    assert np.allclose(extra, 0.1 * 12.5e6 * np.abs(x), atol=0.1)
-
-
-def paired(by: Trace, values: Trace) -> tuple[Trace, Trace]:
-    """Values on the side of growing `by`, sorted, for interpolation."""
-    order = np.argsort(by)
-    return by[order], values[order]
-
-
-@pytest.mark.parametrize("formula", KNOWN_A["column.yielding"].formulas)
-def test_yielding_begins_elastic_bends_and_dissipates(formula: str) -> None:
-    found = play_a(effect("column.yielding", formula, yield_displacement=1e-3, hardening=0.05))
-    x, f = found["column_displacement"], found["column_force"]
-    first = np.abs(np.maximum.accumulate(np.abs(x))) < 0.3e-3
-    assert np.allclose(f[first], 12.5e6 * x[first], atol=0.01 * 12.5e3 + 5.0)
-    assert 0.6 * 12.5e3 < np.max(np.abs(f)) < 1.35 * 12.5e3 * (1.0 + 0.05)
-    assert np.trapezoid(f, x) > 0.0
-    outside = np.abs(f) - 12.5e6 * (1e-3 + 0.05 * np.maximum(np.abs(x) - 1e-3, 0.0))
-    bound = 0.01 if formula != "ramberg_osgood" else 0.25
-    assert np.max(outside) < bound * 12.5e3
-
-
-def test_takeda_softens_as_it_unloads() -> None:
-    ramp = np.concatenate([np.linspace(0.0, 4e-3, 2000), np.linspace(4e-3, 0.0, 2000)])
-    found = play_a(effect("column.yielding", "takeda", yield_displacement=1e-3, hardening=0.0), command=ramp)
-    x, f = found["column_displacement"][2600:2900], found["column_force"][2600:2900]
-    down = f > 100.0
-    slope = np.polyfit(x[down], f[down], 1)[0]
-    assert slope == pytest.approx(12.5e6 * (1e-3 / np.max(found["column_displacement"])) ** 0.4, rel=0.01)
-
-
-def test_the_valve_limits_the_speed_and_the_load_the_way() -> None:
-    for formula in ("smooth", "orifice"):
-        slow = play_a(effect("actuator.velocity_limit", formula, velocity=0.015))
-        speed = np.max(np.abs(np.diff(slow["column_displacement"]))) / DT
-        assert 0.010 < speed < 0.017
-    ramp = np.minimum(TIMES, 1.0) * 2e-3
-    held = play_a(effect("actuator.compliance", compliance=2e-8), command=ramp)
-    assert held["column_displacement"][-1] == pytest.approx(2e-3 / (1.0 + 2e-8 * 12.5e6), rel=1e-6)
-    for width in (1e-4, 4e-4):
-        loose = play_a(effect("actuator.backlash", width=width), command=ramp)
-        assert loose["column_displacement"][-1] == pytest.approx(2e-3 - 0.5 * width, abs=1e-6)
-        short = play_a(effect("column.slip", gap=width), command=ramp)
-        assert short["column_force"][-1] == pytest.approx(12.5e6 * (2e-3 - 0.5 * width), rel=1e-3)
-
-
-def test_friction_stops_and_drags_the_damper() -> None:
-    still = np.zeros(TIMES.size)
-    held = play_b(
-        effect("damper.friction", "lugre", force=5.0), command=still, motor=np.full(TIMES.size, 3.0)
-    )
-    assert np.max(np.abs(held["damper_stroke"])) < 1e-4
-    tugged = play_b(
-        effect("damper.friction", "lugre", force=5.0), command=still, motor=np.full(TIMES.size, 7.0)
-    )
-    assert np.max(tugged["damper_stroke"]) > 0.01
-    for formula in ("tanh", "dahl", "lugre"):
-        found = play_b(effect("damper.friction", formula, force=5.0))
-        assert np.std(found["damper_stroke"]) < np.std(CLEAN["damper_stroke"])
-
-
-def test_the_damper_pushes_the_table_and_obeys_its_mass() -> None:
-    found = play_b(effect("damper.friction", "dahl", force=5.0))
-    s = found["damper_stroke"]
-    acceleration = np.gradient(np.gradient(s, DT), DT) + found["table_acceleration"]
-    assert np.corrcoef(-16.0 * acceleration[10:-10], found["damper_force"][10:-10])[0, 1] > 0.995
-    still = np.zeros(2000)
-    push = np.full(2000, 20.0)
-    found = play_b(effect("table.payload", compliance=1e-5), command=still, motor=push)
-    assert found["table_displacement"][100] == pytest.approx(1e-5 * found["damper_force"][100], rel=0.05)
-    assert play_b(command=still, motor=push)["damper_force"][1] < 0.0
-
-
-def test_stops_and_limits_hold() -> None:
-    for formula in ("hertz", "linear"):
-        found = play_b(effect("damper.stroke_stop", formula, stroke=0.015, stiffness=200e3))
-        assert np.max(np.abs(found["damper_stroke"])) < 0.021
-        assert np.max(np.abs(CLEAN["damper_stroke"])) > 0.021
-    still, push = np.zeros(100), np.full(100, 1000.0)
-    found = play_b(effect("damper.force_limit", force=40.0), command=still, motor=push)
-    assert found["damper_force"][10] == pytest.approx(-40.0, abs=4.0)
-
-
-def test_a_motor_without_lag_obeys_at_once() -> None:
-    found = play_b(
-        effect("damper.motor_lag", time_constant=-0.05), command=np.zeros(3), motor=np.full(3, 10.0)
-    )
-    assert found["damper_force"][1] == pytest.approx(-10.0, abs=0.02)
-
-
-@pytest.mark.parametrize("name", ["actuator.delay", "table.delay"])
-def test_pade_delays(name: str) -> None:
-    """Padé's approximation of 8 ms more delays as the ring does; of 2 ms less, too."""
-    for more in (0.008, -0.002):
-        found = play(effect(name, "", delay=more))
-        if name == "actuator.delay":
-            exact = play_a(actuator={"delay": 0.014 + more})
-        else:
-            exact = play_b(table={"delay": 0.004 + more})
-        for signal, values in found.items():
-            assert near(values, exact[signal], 1e-2 if signal == "table_acceleration" else 2e-3), signal
-
-
-@pytest.mark.parametrize("signal", SIGNALS)
-def test_readings_are_falsified_one_by_one(signal: str) -> None:
-    clean, size = CLEAN[signal], float(np.max(np.abs(CLEAN[signal])))
-    other = [name for name in (SIGNALS_A if signal in SIGNALS_A else SIGNALS_B) if name != signal]
-    wanted = {
-        f"sensor.{signal}.gain": ({"factor": 1.1}, 1.1 * clean),
-        f"sensor.{signal}.bias": ({"offset": 0.1 * size}, clean + 0.1 * size),
-        f"sensor.{signal}.drift": ({"rate": 0.01 * size}, clean + 0.01 * size * TIMES),
-        f"sensor.{signal}.quantization": (
-            {"step": 0.05 * size},
-            0.05 * size * np.floor(clean / (0.05 * size) + 0.5),
-        ),
-        f"x.sensor.{signal}.saturation": ({"limit": size}, size * np.tanh(clean / size)),
-    }
-    for name, (parameters, values) in wanted.items():
-        found = play(effect(name, "", **parameters))
-        assert np.allclose(found[signal], values, rtol=0.0, atol=1e-9 * size), name
-        assert all(np.array_equal(found[item], CLEAN[item]) for item in other)
-    noisy = play(effect(f"sensor.{signal}.noise", rms=0.01 * size))
-    assert np.std(noisy[signal] - clean) == pytest.approx(0.01 * size, rel=0.05)
-
-
-def test_a_lag_is_a_delay_at_low_frequency() -> None:
-    slow = RISE * 1e-3 * np.sin(4.0 * TIMES)
-    clean = play_a(command=slow)["column_displacement"]
-    for formula in ("butterworth", "first_order"):
-        found = play_a(effect("sensor.column_displacement.lag", formula, time_constant=0.008), command=slow)
-        late = np.interp(TIMES - 0.008, TIMES, clean)
-        assert near(found["column_displacement"][50:], late[50:], 2e-3), formula
-        assert not near(found["column_displacement"], clean, 5e-3)
-
-
-def test_readings_leak_and_get_lost() -> None:
-    leak = play_b(effect("x.sensor.table_acceleration.crosstalk", coefficient=1e-3))
-    extra = leak["table_acceleration"] - CLEAN["table_acceleration"]
-    assert np.allclose(extra, 1e-3 * CLEAN["damper_force"], atol=1e-12)
-    lost = play_a(effect("x.sensor.column_force.missing", probability=0.2))["column_force"]
-    repeated = np.diff(lost[100:]) == 0.0
-    assert np.mean(repeated) == pytest.approx(0.2, abs=0.03)
-    assert np.array_equal(lost[101:][~repeated], CLEAN["column_force"][101:][~repeated])
-
-
-def test_noise_is_white_and_of_its_level_and_follows_the_seed() -> None:
-    still = np.zeros(TIMES.size)
-    found = play_b(command=still, motor=still, sensors={})
-    for name, level in zip(SIGNALS_B, (10e-6, 0.01, 2e-6, 0.2), strict=True):
-        assert np.std(found[name]) == pytest.approx(level, rel=0.05)
-        assert abs(np.corrcoef(found[name][1:], found[name][:-1])[0, 1]) < 0.06
-    again = play_b(command=still, motor=still, sensors={})
-    assert all(np.array_equal(values, again[name]) for name, values in found.items())
-    assert TrueColumnLab(DT, 4).read() != TrueColumnLab(DT, 5).read()
 
 
 @pytest.mark.parametrize(
