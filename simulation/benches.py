@@ -183,7 +183,7 @@ def armed(rig: GuardedRig, sink: Sink, at_ns: int) -> Iterator[None]:
     finally:
         if complaint := rig.disarm():
             values = (0.0, "bench", "warning", "disarm", str(complaint), dict[str, float]())
-            sink.put([other("event", at_ns, at_ns, values)])
+            sink.put([other("event", (at_ns, at_ns, *values))])
 
 
 class Bench:

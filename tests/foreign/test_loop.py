@@ -80,6 +80,7 @@ class Ticking(Pace):
     """As in real time a tick ends whether the program has answered or not."""
 
     settles = True
+    eager = 0
 
     def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
         """Nothing is left once it is asked."""
