@@ -16,7 +16,7 @@ from report.text.progress import Progress
 
 if TYPE_CHECKING:
     from report.text.terminal import TitledTable
-    from simulation.foretold.held import Held
+    from simulation.prediction.held import Held
     from simulation.source import ComparedRun
 
 TABLES = (".csv", ".parquet")  # formats that hold the texts of a column
@@ -157,11 +157,11 @@ def against_prediction(args: argparse.Namespace) -> int:
     if args.tolerance is not None:
         raise InputError("--tolerance is of two recordings: leave it out with --predicted, which has a band.")
     from common.recording.reader import read
-    from simulation.foretold import held
+    from simulation.prediction import held
 
     found = held.held(read(Path(args.a)), read(args.predicted))
     if args.json:
-        from report.foretold import said
+        from report.prediction import said
 
         sys.stdout.write(json.dumps(held.plain(found) | {"sentences": said.sentences(found)}) + "\n")
     else:
@@ -171,7 +171,7 @@ def against_prediction(args: argparse.Namespace) -> int:
 
 def show_held(found: Held) -> None:
     """How a recording lay in a prediction, as text."""
-    from report.foretold import said
+    from report.prediction import said
     from report.text.terminal import table
 
     rows = [["signal", "inside", "first left", "times left", "farthest", "at"]]

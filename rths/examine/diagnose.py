@@ -22,7 +22,7 @@ from report.text.progress import Progress
 
 if TYPE_CHECKING:
     from common.recording.run import Run
-    from diagnosis.findings.foretelling.as_reality import FoundReality
+    from diagnosis.findings.for_prediction.as_reality import FoundReality
     from diagnosis.report.records import Report
 
 LAWS = ".npz"  # ending of the file beside the reality: laws that were learned, and how sure all of it is
@@ -226,7 +226,7 @@ def diagnosed(
     from common.plan import read as plans
     from common.recording.reader import read
     from diagnosis.diagnose import diagnose
-    from diagnosis.findings.foretelling.as_reality import as_reality
+    from diagnosis.findings.for_prediction.as_reality import as_reality
     from diagnosis.recorded import record
     from diagnosis.recorded.slips import refuse_slips
     from report.gap import wording

@@ -16,7 +16,7 @@ from common.terminal import cli, outputs
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
-    from simulation.foretold.bands import Prediction
+    from simulation.prediction.bands import Prediction
 
 DRAWS = 64
 
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.output_argument(
         parser,
         "FILE",
-        "write the test as foretold and its band as a recording, for viewers and rths compare --predicted",
+        "write the test as predicted and its band as a recording, for viewers and rths compare --predicted",
     )
     parser.add_argument("--html", type=Path, metavar="OUT", help="write the prediction as one HTML page")
     parser.add_argument(
@@ -44,13 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Foretell the test; 1 where it passes a limit of the plan in half of the laboratories drawn, or more."""
+    """Predict the test; 1 where it passes a limit of the plan in half of the laboratories drawn, or more."""
     plan = cli.load_plan(args)
     if args.no_amd:
         plan = plan.everywhere(control=Control(amd=False, gain=plan.control.gain))
     check(args)
     with Progress("predicting") as progress:
-        from simulation.foretold import bands, draws, file
+        from simulation.prediction import bands, draws, file
 
         found = bands.predict(draws.load(args.found, plan), plan, args.draws, progress.tell)
         found = replace(found, plan=plan)
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
             with outputs.writing(args.output, args.force) as path:
                 file.write(path, found, args.found.name)
         if args.html:
-            from report.foretold import page
+            from report.prediction import page
 
             progress.tell("page", 0, 0)
             outputs.write_text(args.html, page.page(found, args.found.name), args.force)
@@ -85,7 +85,7 @@ def check(args: argparse.Namespace) -> None:
 
 def show(plan: Plan, found: Prediction, stream: TextIO) -> None:
     """The summary as text."""
-    from report.foretold import tables
+    from report.prediction import tables
     from report.text.terminal import table
 
     stream.write(

@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     plan = plans.load(path)
     outputs.checked(args.output, args.force, [path, args.found])
     with Progress("updating") as progress:
-        from simulation.foretold import draws
+        from simulation.prediction import draws
         from simulation.updated import nominal, trials
 
         found = draws.load(args.found, plan)

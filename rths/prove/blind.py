@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from validation.blind.cases.basis import TrialBasis
     from validation.blind.cases.case import Case
-    from validation.blind.predicted.foretell import ForetoldCase
     from validation.blind.predicted.next_test import NextTest
+    from validation.blind.predicted.predict import PredictedCase
     from validation.blind.progress import CasesDone
     from validation.blind.record import RecordedCase
     from validation.blind.results.measures import Measure
@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--predict",
         action="store_true",
-        help="also foretell the next test of each case with what was found, play it, and judge the prediction",
+        help="also predict the next test of each case with what was found, play it, and judge the prediction",
     )
     cli.output_argument(
         parser,
@@ -121,14 +121,14 @@ def run(args: argparse.Namespace) -> int:
                 folder,
             )
         following = [next_test(case, args.seed, args.set, trial) for case in cases] if args.predict else []
-        foretold = foretell_cases(following, recorded, Path(place), args, progress.tell)
-        found = write(folder, outcomes, about, foretold)
+        predicted = predict_cases(following, recorded, Path(place), args, progress.tell)
+        found = write(folder, outcomes, about, predicted)
         write_table(folder / TABLE, table_of(cases, found["cases"]), force=True)
-    table = [*measures(outcomes), *(of_predictions(foretold) if foretold else ())]
+    table = [*measures(outcomes), *(of_predictions(predicted) if predicted else ())]
     if args.json:
         sys.stdout.write(json.dumps(found) + "\n")
     else:
-        show(table, outcomes, foretold)
+        show(table, outcomes, predicted)
         sys.stdout.write(f"page: {folder / 'index.html'}\n")
     return 1 if any(item.passed is False for item in table) else 0
 
@@ -215,22 +215,22 @@ def what(args: argparse.Namespace, trial: TrialBasis) -> dict[str, Any]:
     return said | {"plan": trial.plan.digest(), "version": versions()}
 
 
-def foretell_cases(
+def predict_cases(
     following: Sequence[NextTest],
     recorded: dict[int, RecordedCase],
     place: Path,
     args: argparse.Namespace,
     tell: Tell,
-) -> list[ForetoldCase]:
+) -> list[PredictedCase]:
     """The predictions of all next tests, judged, in the order of the cases; `place` has what was found."""
-    from validation.blind.predicted.foretell import foretell_all
+    from validation.blind.predicted.predict import predict_all
 
     work = [(one, (place / recorded[one.case.index].name).with_suffix(".toml")) for one in following]
-    done: list[ForetoldCase] = []
-    tell("foretold", 0, len(work))
-    for item in foretell_all(work, args.jobs, args.output if args.keep else None):
+    done: list[PredictedCase] = []
+    tell("predicted", 0, len(work))
+    for item in predict_all(work, args.jobs, args.output if args.keep else None):
         done.append(item)
-        tell("foretold", len(done), len(work))
+        tell("predicted", len(done), len(work))
     return sorted(done, key=lambda item: item.index)
 
 
@@ -249,7 +249,7 @@ def keep(cases: Iterable[Case], recorded: dict[int, RecordedCase], place: Path, 
 
 
 def write(
-    folder: Path, outcomes: Sequence[Outcome], about: str, foretold: Sequence[ForetoldCase]
+    folder: Path, outcomes: Sequence[Outcome], about: str, predicted: Sequence[PredictedCase]
 ) -> dict[str, Any]:
     """The page and the results in a folder; the results."""
     from validation.blind.predicted.results import results as of_predictions
@@ -257,14 +257,14 @@ def write(
     from validation.blind.results.page import page
 
     found = {"version": 1, "about": about, **results(outcomes)}
-    if foretold:
-        found["predictions"] = of_predictions(foretold)
-    (folder / "index.html").write_text(page(outcomes, about, foretold), encoding="utf-8")
+    if predicted:
+        found["predictions"] = of_predictions(predicted)
+    (folder / "index.html").write_text(page(outcomes, about, predicted), encoding="utf-8")
     (folder / "results.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
     return found
 
 
-def show(table: Sequence[Measure], outcomes: Sequence[Outcome], foretold: Sequence[ForetoldCase]) -> None:
+def show(table: Sequence[Measure], outcomes: Sequence[Outcome], predicted: Sequence[PredictedCase]) -> None:
     """Write the measures, the table of cases, that of predictions, and a line on each case whose answer is wrong."""
     from report.text import terminal
     from validation.blind.predicted import results
@@ -276,9 +276,9 @@ def show(table: Sequence[Measure], outcomes: Sequence[Outcome], foretold: Sequen
     terminal.table(rows)
     sys.stdout.write("\n")
     terminal.table([list(HEAD), *(list(item.cells) for item in case_rows(outcomes))])
-    if foretold:
+    if predicted:
         sys.stdout.write("\n")
-        terminal.table([list(results.HEAD), *(list(results.cells(item)) for item in foretold)])
+        terminal.table([list(results.HEAD), *(list(results.cells(item)) for item in predicted)])
     wrong = [item for item in outcomes if not item.right]
     sys.stdout.write(f"\n{len(outcomes) - len(wrong)} of {len(outcomes)} cases right\n")
     for item in wrong:

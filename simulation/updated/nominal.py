@@ -21,7 +21,7 @@ from laboratories.effects import sites
 from laboratories.effects.effect import Effect
 from laboratories.kinds import kinds_of
 from models.system import Effects, System
-from simulation.foretold.draws import FoundLaboratories
+from simulation.prediction.draws import FoundLaboratories
 
 # Relative difference between a sensor's noise and the plan's above which the plan is changed. The rms of some thousand
 # samples is known to 2 %, so that a difference of 5 % is no chance.

@@ -21,7 +21,7 @@ from loop.nominal.preflight import expected_delay
 from loop.of_reality import rolled_out
 from loop.signals import by_role
 from models.compensators import COMPENSATORS
-from simulation.foretold.draws import FoundLaboratories, drawn
+from simulation.prediction.draws import FoundLaboratories, drawn
 
 PLANNED = "as planned"
 # Gains of the feedback loop: GAINS, those of the paper and of the default test, beside a feedforward; WEAKER beside an

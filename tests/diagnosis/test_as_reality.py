@@ -17,7 +17,7 @@ from common.reality.found import models_of
 from common.recording.reader import read
 from common.roles import MASTER
 from diagnosis.diagnose import examine
-from diagnosis.findings.foretelling.as_reality import as_reality, changed
+from diagnosis.findings.for_prediction.as_reality import as_reality, changed
 from diagnosis.recorded import record
 from loop.realised import true_slaves, true_system
 from tests.diagnosis.cases import Cases, short

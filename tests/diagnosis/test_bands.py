@@ -16,7 +16,7 @@ from common.reality.reality import Reality
 from common.recording.reader import read
 from diagnosis.diagnose import parts_of
 from diagnosis.findings import readings
-from diagnosis.findings.foretelling.as_reality import as_reality
+from diagnosis.findings.for_prediction.as_reality import as_reality
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import heard, judge
 from diagnosis.fits import fitting, residuals
@@ -27,7 +27,7 @@ from loop.closed_loop import Rollout
 from loop.of_reality import really
 from rths.examine.diagnose import write_found
 from rths.prepare.simulate import write as write_recording
-from simulation.foretold import bands, draws, file, held
+from simulation.prediction import bands, draws, file, held
 from tests.diagnosis.cases import Effects, jitter, short, tables
 
 SECONDS = 6.0

@@ -15,11 +15,11 @@ from common.reality.reality import as_planned, from_reality
 from common.reality.spread import Spread
 from laboratories.effects import CATALOGUE, sites
 from loop.of_reality import really
-from simulation.foretold import draws
-from simulation.foretold.draws import FoundLaboratories
+from simulation.prediction import draws
+from simulation.prediction.draws import FoundLaboratories
 from simulation.updated import nominal, trials
 from simulation.updated.trials import Lag
-from tests.simulation.test_foretold import short, written
+from tests.simulation.test_prediction import short, written
 
 SLOWER: list[dict[str, Any]] = [
     {"name": "actuator.delay", "laboratory": "master", "delay": 0.006},

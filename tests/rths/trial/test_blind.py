@@ -23,7 +23,7 @@ from common.reality.spread import Spread, UncertainParameter
 from common.recording.reader import read
 from common.roles import MASTER, SLAVE
 from common.terminal import cli
-from diagnosis.findings.foretelling.as_reality import FoundReality
+from diagnosis.findings.for_prediction.as_reality import FoundReality
 from diagnosis.report.read import report as read_report
 from diagnosis.report.records import Report
 from laboratories.effects import CATALOGUE
@@ -37,8 +37,8 @@ from validation.blind.draw import draw as draw_of
 from validation.blind.judge import diagnose_all
 from validation.blind.library import Library
 from validation.blind.predicted import results as predictions
-from validation.blind.predicted.foretell import foretell
 from validation.blind.predicted.next_test import next_test
+from validation.blind.predicted.predict import predict
 from validation.blind.record import record, record_all
 
 HERE = "tests.rths.trial.test_blind"
@@ -145,7 +145,7 @@ def test_a_failing_diagnosis_does_not_take_the_others_with_it(tmp_path: Path) ->
         diagnose_all(tmp_path, diagnosis="rths.nowhere:x")
 
 
-def test_the_next_test_of_every_case_is_foretold_and_judged(
+def test_the_next_test_of_every_case_is_predicted_and_judged(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code = command(
@@ -159,7 +159,9 @@ def test_the_next_test_of_every_case_is_foretold_and_judged(
     assert "Predictions of the next test" in (tmp_path / "out" / "index.html").read_text()
     assert [one["goal"] for one in found["measures"]] == ["≤ 0.100", "≤ 0.500", "85.0 % to 95.0 %"]
     for one in found["cases"]:
-        assert one["ratio"] == pytest.approx(1.0, abs=0.1)  # nothing was found, so nothing is foretold better
+        assert one["ratio"] == pytest.approx(
+            1.0, abs=0.1
+        )  # nothing was found, so nothing is predicted better
         assert 0.0 < one["inside"] < 1.0
         assert 0.5 <= one["stronger"] <= 2.0
         kept = tmp_path / "out" / f"case-{one['index']:05d}"
@@ -177,7 +179,7 @@ def test_a_next_test_is_the_same_every_time_and_a_failed_prediction_counts(tmp_p
     one = next_test(case, 3, "tune", trial)
     assert one == next_test(case, 3, "tune", trial)
     assert one.case.seed != case.seed
-    outcome = foretell((one, tmp_path / "none.toml"))
+    outcome = predict((one, tmp_path / "none.toml"))
     assert "No such file" in outcome.error
     assert outcome.ratio == math.inf
     median, worst, inside = predictions.measures([outcome])

@@ -1,1 +1,1 @@
-"""Predictions of the blind trial: the next test of every case, foretold with what a diagnosis found, and judged."""
+"""Predictions of the blind trial: the next test of every case, predicted with what a diagnosis found, and judged."""

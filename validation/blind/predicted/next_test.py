@@ -23,7 +23,7 @@ from validation.blind.logger.relogging import relog
 from validation.blind.oracle import RANDOM
 
 Readings = Mapping[str, Mapping[str, Array]]  # by role and name
-# Plays whose mean is the truth where messages are lost or late by chance, which nobody can foretell: their scatter in
+# Plays whose mean is the truth where messages are lost or late by chance, which nobody can predict: their scatter in
 # the mean is a third of that of one play.
 PLAYS = 8
 BY_CHANCE = ("link.loss", "link.jitter")
@@ -114,7 +114,7 @@ def of_all(series: Sequence[Array]) -> Array:
 def driven(case: Case, path: Path, *, without_noise: bool) -> str:
     """Record the test of a case; why a limit ended it, empty where it was completed.
 
-    Without noise, effects that are noise are left out as well: nobody can foretell a draw of them.
+    Without noise, effects that are noise are left out as well: nobody can predict a draw of them.
     """
     from simulation import virtual
 

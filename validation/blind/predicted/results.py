@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from report.text.formats import MISSING, percent, quantity
-from validation.blind.predicted.foretell import ForetoldCase
+from validation.blind.predicted.predict import PredictedCase
 from validation.blind.results.measures import Measure, as_plain, quantile
 
 HEAD = ("case", "kind", "hidden", "next test", "before", "after", "after / before", "inside", "remarks")
@@ -20,7 +20,7 @@ HELD = (0.85, 0.95)
 SURE = 1.96  # standard errors of a mean on both sides, for an interval of 95 %
 
 
-def measures(cases: Sequence[ForetoldCase]) -> list[Measure]:
+def measures(cases: Sequence[PredictedCase]) -> list[Measure]:
     """The table; a prediction that could not be made counts as the worst."""
     ratios = [one.ratio for one in cases]
     return [
@@ -44,7 +44,7 @@ def share_inside(shares: Sequence[float]) -> Measure:
     return Measure(name, mean, low, high, len(shares), rate=True, least=least, most=most, passed=passed)
 
 
-def cells(one: ForetoldCase) -> tuple[str, ...]:
+def cells(one: PredictedCase) -> tuple[str, ...]:
     """The row of a case in words."""
     remarks = [one.error, f"stopped: {one.stopped}" if one.stopped else "", beyond(one)]
     return (
@@ -60,14 +60,14 @@ def cells(one: ForetoldCase) -> tuple[str, ...]:
     )
 
 
-def beyond(one: ForetoldCase) -> str:
+def beyond(one: PredictedCase) -> str:
     """Where the prediction says that the test leaves what was seen."""
     parts = [f"{role} {ratio:.2g} × the amplitude" for role, ratio in one.farther.items()]
     parts += [f"{role} {percent(share, 0)} at other frequencies" for role, share in one.elsewhere.items()]
     return f"said beyond what was seen: {', '.join(parts)}" if parts else ""
 
 
-def results(cases: Sequence[ForetoldCase]) -> dict[str, Any]:
+def results(cases: Sequence[PredictedCase]) -> dict[str, Any]:
     """Everything that is written as JSON."""
     from dataclasses import asdict
 

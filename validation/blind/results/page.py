@@ -11,7 +11,7 @@ from report.page import data_uri, frame, render
 from report.pictures.figure import COLOURS, figure
 from report.text.formats import MISSING, quantity
 from validation.blind.predicted import results as predictions
-from validation.blind.predicted.foretell import ForetoldCase
+from validation.blind.predicted.predict import PredictedCase
 from validation.blind.results.measures import (
     Bin,
     Matrix,
@@ -37,8 +37,8 @@ class Image(NamedTuple):
     caption: str
 
 
-def page(outcomes: Sequence[Outcome], about: str, foretold: Sequence[ForetoldCase] = ()) -> str:
-    """The HTML text; `about` says how the cases were made, `foretold` are their predictions."""
+def page(outcomes: Sequence[Outcome], about: str, predicted: Sequence[PredictedCase] = ()) -> str:
+    """The HTML text; `about` says how the cases were made, `predicted` are their predictions."""
     wrong = [item for item in outcomes if not item.right]
     body = render(
         "blind.html",
@@ -46,11 +46,11 @@ def page(outcomes: Sequence[Outcome], about: str, foretold: Sequence[ForetoldCas
         about=about,
         right=len(outcomes) - len(wrong),
         count=len(outcomes),
-        measures=[*measures(outcomes), *(predictions.measures(foretold) if foretold else ())],
+        measures=[*measures(outcomes), *(predictions.measures(predicted) if predicted else ())],
         row_head=HEAD,
         rows=[item.cells for item in case_rows(outcomes)],
-        foretold_head=predictions.HEAD,
-        foretold=[predictions.cells(item) for item in foretold],
+        predicted_head=predictions.HEAD,
+        predicted=[predictions.cells(item) for item in predicted],
         matrices=matrices(outcomes),
         curves=curves(outcomes),
         names=CASE,

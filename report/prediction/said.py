@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from common.roles import title
 from report.text.formats import quantity
-from simulation.foretold.bands import HELD
-from simulation.foretold.held import ENOUGH, Held, HeldSignal
-from simulation.foretold.rest import BEYOND, OUTSIDE
-from simulation.foretold.shape import ErrorShape
+from simulation.prediction.bands import HELD
+from simulation.prediction.held import ENOUGH, Held, HeldSignal
+from simulation.prediction.rest import BEYOND, OUTSIDE
+from simulation.prediction.shape import ErrorShape
 
 # Share of a signal's error that one shape must explain for the error to be named after it: more than half.
 MOSTLY = 0.5

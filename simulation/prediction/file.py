@@ -13,7 +13,7 @@ from laboratories import kinds
 from loop import substructure
 from loop.signals import rows
 from recorder import files
-from simulation.foretold.bands import HELD, Prediction, plain
+from simulation.prediction.bands import HELD, Prediction, plain
 
 LOWER, UPPER = "lower", "upper"  # prefixes of the topics for the ends of the band
 ABOUT = (

@@ -19,21 +19,21 @@ class ErrorShape(NamedTuple):
     share: float  # of the error's energy
 
 
-def shape_of(values: Values, foretold: Values, t: Values) -> ErrorShape:
-    """The shape that explains most of values - foretold, both (ticks, storeys or slaves).
+def shape_of(values: Values, predicted: Values, t: Values) -> ErrorShape:
+    """The shape that explains most of values - predicted, both (ticks, storeys or slaves).
 
     `size` is a factor on the prediction, `delay` a factor on its time derivative. The energy of white noise is half of
     the energy of the differences between successive errors.
     """
-    error = values - foretold
+    error = values - predicted
     power = float(np.sum(error**2))
     if t.size < 3 or not power > 0.0:
         return ErrorShape(NONE, 0.0, 0.0)
     shapes = {
         "offset": np.ones_like(error),
         "drift": np.broadcast_to((t - t[0])[:, None], error.shape),
-        "size": foretold,
-        "delay": -np.gradient(foretold, t, axis=0),
+        "size": predicted,
+        "delay": -np.gradient(predicted, t, axis=0),
     }
     found = [ErrorShape(name, *fit(error, shape, power)) for name, shape in shapes.items()]
     white = min(0.5 * float(np.sum(np.diff(error, axis=0) ** 2)), power)

@@ -15,7 +15,7 @@ from report.page import data_uri
 from report.pictures import figure
 from report.run.drawing import INCH, DrawnPicture
 from report.text.formats import axis_scale
-from simulation.foretold.bands import Prediction
+from simulation.prediction.bands import Prediction
 
 ROW = 1.35  # inches, the height of one signal's axes
 CAPTION = "The laboratories as found, and the band of 90 % of those drawn."

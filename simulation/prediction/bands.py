@@ -19,9 +19,9 @@ from loop.nominal import limited, partition
 from loop.signals import by_role, signals
 from models.ground_motion import GroundMotion
 from models.registry import Array
-from simulation.foretold import rest
-from simulation.foretold.draws import Ensemble, FoundLaboratories, ensemble, has_random_links
-from simulation.foretold.rest import RangeSeen
+from simulation.prediction import rest
+from simulation.prediction.draws import Ensemble, FoundLaboratories, ensemble, has_random_links
+from simulation.prediction.rest import RangeSeen
 
 HELD = 0.9  # share of the time for which a signal should lie within its band
 LOW, HIGH = 0.5 * (1.0 - HELD), 0.5 * (1.0 + HELD)
@@ -112,7 +112,7 @@ def about(found: FoundLaboratories, drawn: Ensemble, count: int) -> list[str]:
         )
     if not drawn.central.finite:
         result.append(
-            "In the laboratories as found the test is unstable: the line foretold is the median of those drawn."
+            "In the laboratories as found the test is unstable: the middle of the band is the median of those drawn."
         )
     if drawn.diverged:
         result.append(f"The test is unstable in {drawn.diverged} of the {count} laboratories drawn.")

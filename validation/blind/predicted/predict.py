@@ -1,4 +1,4 @@
-"""What a diagnosis found, judged by the next test that it foretells.
+"""What a diagnosis found, judged by the next test that it predicts.
 
 The error of a simulation is the root mean square, over all readings, of rms(simulated - true)/rms(true), where the true
 readings are those without noise; where messages are lost or late by chance, the mean of several plays. Readings that
@@ -27,9 +27,9 @@ from loop.closed_loop import Rollout
 from loop.of_reality import really
 from loop.signals import by_role
 from models.registry import Array
-from report.foretold import said
-from simulation.foretold import bands, draws, file, held
-from simulation.foretold.rest import BEYOND, OUTSIDE
+from report.prediction import said
+from simulation.prediction import bands, draws, file, held
+from simulation.prediction.rest import BEYOND, OUTSIDE
 from simulation.workers.pool import spread
 from validation.blind.cases.names import CaseNames
 from validation.blind.predicted.next_test import NextTest, PlayedTest, Readings, play
@@ -38,7 +38,7 @@ from validation.blind.worker import ENDINGS
 
 
 @dataclass(frozen=True)
-class ForetoldCase:
+class PredictedCase:
     """The prediction of one case's next test, judged."""
 
     index: int
@@ -47,9 +47,9 @@ class ForetoldCase:
     motion: str
     stronger: float  # peak drift of the linear building over that of the diagnosed test
     before: float  # error of the nominal simulation
-    after: float  # error of the prediction; infinite where nothing could be foretold
+    after: float  # error of the prediction; infinite where nothing could be predicted
     inside: (
-        float  # share of the time that the recorded test lay inside the band; NaN where nothing was foretold
+        float  # share of the time that the recorded test lay inside the band; NaN where nothing was predicted
     )
     said: list[str]  # sentences of the prediction and of the comparison with the recorded test
     signals: Mapping[str, float] = field(default_factory=dict)  # share inside by signal
@@ -58,7 +58,7 @@ class ForetoldCase:
     farther: Mapping[str, float] = field(default_factory=dict)
     elsewhere: Mapping[str, float] = field(default_factory=dict)
     stopped: str = ""  # why the next test ended early, empty where it was completed
-    error: str = ""  # why nothing was foretold
+    error: str = ""  # why nothing was predicted
 
     @property
     def ratio(self) -> float:
@@ -66,8 +66,8 @@ class ForetoldCase:
         return self.after / self.before if self.before > 0.0 else math.inf
 
 
-def foretell(work: tuple[NextTest, Path], kept: Path | None = None) -> ForetoldCase:
-    """Foretell the next test of a case from the file of what was found, play it, and compare.
+def predict(work: tuple[NextTest, Path], kept: Path | None = None) -> PredictedCase:
+    """Predict the next test of a case from the file of what was found, play it, and compare.
 
     Prediction, played test and the files of what was found are copied into a folder in `kept`, if given.
     """
@@ -92,13 +92,13 @@ def foretell(work: tuple[NextTest, Path], kept: Path | None = None) -> ForetoldC
         try:
             prediction = bands.predict(draws.load(found, plan), plan)
         except RthsError as problem:
-            return ForetoldCase(**about, after=math.inf, inside=math.nan, said=[], error=str(problem))
+            return PredictedCase(**about, after=math.inf, inside=math.nan, said=[], error=str(problem))
         written = Path(place) / "predicted.mcap"
         file.write(written, prediction, found.name)
         came_out = held.held(read(played.recording), read(written))
         if kept:
             keep(kept / f"case-{case.index:05d}", found, played, written)
-    return ForetoldCase(
+    return PredictedCase(
         **about,
         after=error(plan, prediction.middle, played.silent, case_levels(following, plan)),
         inside=came_out.inside,
@@ -109,11 +109,11 @@ def foretell(work: tuple[NextTest, Path], kept: Path | None = None) -> ForetoldC
     )
 
 
-def foretell_all(
+def predict_all(
     work: Sequence[tuple[NextTest, Path]], jobs: int = 1, kept: Path | None = None
-) -> Iterator[ForetoldCase]:
-    """As `foretell`, for many cases, in the order in which they are ready; each is kept in a folder of its own."""
-    yield from spread(partial(foretell, kept=kept), work, jobs)
+) -> Iterator[PredictedCase]:
+    """As `predict`, for many cases, in the order in which they are ready; each is kept in a folder of its own."""
+    yield from spread(partial(predict, kept=kept), work, jobs)
 
 
 def case_levels(following: NextTest, plan: Plan) -> dict[str, dict[str, float]]:

@@ -22,11 +22,11 @@ from common.roles import MASTER
 from common.terminal import cli
 from loop import substructure
 from loop.of_reality import really, rolled_out
-from report.foretold import said
+from report.prediction import said
 from rths.__main__ import main
 from rths.prepare.simulate import write as record
-from simulation.foretold import bands, draws, file, held, rest, shape
-from simulation.foretold.bands import Prediction
+from simulation.prediction import bands, draws, file, held, rest, shape
+from simulation.prediction.bands import Prediction
 
 FRICTION = UncertainParameter("slave", "force", "damper.friction", least=0.0, most=100.0)
 STIFFNESS = UncertainParameter(MASTER, "column.stiffness")
@@ -66,7 +66,7 @@ def written(folder: Path, plan: Plan, spread: Spread = SPREAD, **more: Any) -> P
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with what was found."""
-    result = tmp_path_factory.mktemp("foretold")
+    result = tmp_path_factory.mktemp("predicted")
     written(result, short())
     return result
 

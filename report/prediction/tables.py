@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from report.text.formats import quantity
 from report.text.terminal import TitledTable
-from simulation.foretold.bands import LimitChance, PeakBand, Prediction
+from simulation.prediction.bands import LimitChance, PeakBand, Prediction
 
 NEAR = 0.5  # share of a limit that the upper end of a peak's band must reach for its row to be shown
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from report.foretold import pictures, tables
 from report.page import frame, render
-from simulation.foretold.bands import Prediction
+from report.prediction import pictures, tables
+from simulation.prediction.bands import Prediction
 
 SAID = (
     "The parameters of each laboratory are drawn from the uncertainty of the diagnosis, and its sensors have the noise "

@@ -12,7 +12,7 @@ from common.reality.found import LearnedEntry, building_of, models_of
 from common.reality.reality import OF_LABORATORY, TRUE_TABLES
 from common.reality.spread import Spread
 from common.roles import MASTER, name_of
-from diagnosis.findings.foretelling.spread import spread
+from diagnosis.findings.for_prediction.spread import spread
 from diagnosis.findings.found import Diagnosis, laid
 from diagnosis.recorded.record import Record
 from laboratories.effects.sites import LINK

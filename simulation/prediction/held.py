@@ -10,9 +10,9 @@ import numpy as np
 from common.errors import InputError
 from common.recording.run import Run, Values
 from common.roles import MASTER, name_of
-from simulation.foretold import file
-from simulation.foretold.bands import HELD
-from simulation.foretold.shape import ErrorShape, shape_of
+from simulation.prediction import file
+from simulation.prediction.bands import HELD
+from simulation.prediction.shape import ErrorShape, shape_of
 
 # Mean share of the time, over all signals, that must lie inside a band of 90 % for a prediction to hold. It is less
 # than 90 %, because the error of a signal changes slowly, so that the share scatters from test to test.
