@@ -10,7 +10,7 @@ Facts = dict[
 ]  # the values of a recording by the names of COLUMNS; None where a recording does not say
 
 
-class Column(NamedTuple):
+class CatalogueColumn(NamedTuple):
     """A column of the catalogue; `unit` is that of a number in SI, empty for a plain one, and None for a text."""
 
     name: str
@@ -19,27 +19,27 @@ class Column(NamedTuple):
 
 
 COLUMNS = (
-    Column("file", None, "path from the catalogue's folder"),
-    Column("test", None, "name of the test"),
-    Column("started", None, "date and time (UTC) at which the recording began"),
-    Column("duration", "s", "planned length of the test"),
-    Column("clock", None, "real, virtual, simulation or import"),
-    Column("motion", None, "ground motion"),
-    Column("scale", "", "factor on the ground motion"),
-    Column("outcome", None, "completed, stopped, tripped, lost, cut off, imported or simulated"),
-    Column("cause", None, "why the test ended, in words"),
-    Column("ticks", "", "recorded ticks of the master, or of the laboratory with most"),
-    Column("missing", "", "ticks that are not recorded although later ones are"),
-    Column("late", "", "late ticks"),
-    Column("state", None, "whole, cut off, damaged or unreadable"),
-    Column("damage", None, "where the file is damaged"),
-    Column("digest", None, "digest of the plan"),
-    Column("differs", None, "keys of the plan that are not at their defaults, with their values"),
-    Column("diagnosis", None, "status of the diagnosis report (JSON) that names the recording"),
-    Column("verdict", None, "verdict of that report"),
-    Column("tags", None, "tags from the notes beside the recording"),
-    Column("notes", None, "notes beside the recording"),
-    Column("size", "B", "bytes of the file"),
+    CatalogueColumn("file", None, "path from the catalogue's folder"),
+    CatalogueColumn("test", None, "name of the test"),
+    CatalogueColumn("started", None, "date and time (UTC) at which the recording began"),
+    CatalogueColumn("duration", "s", "planned length of the test"),
+    CatalogueColumn("clock", None, "real, virtual, simulation or import"),
+    CatalogueColumn("motion", None, "ground motion"),
+    CatalogueColumn("scale", "", "factor on the ground motion"),
+    CatalogueColumn("outcome", None, "completed, stopped, tripped, lost, cut off, imported or simulated"),
+    CatalogueColumn("cause", None, "why the test ended, in words"),
+    CatalogueColumn("ticks", "", "recorded ticks of the master, or of the laboratory with most"),
+    CatalogueColumn("missing", "", "ticks that are not recorded although later ones are"),
+    CatalogueColumn("late", "", "late ticks"),
+    CatalogueColumn("state", None, "whole, cut off, damaged or unreadable"),
+    CatalogueColumn("damage", None, "where the file is damaged"),
+    CatalogueColumn("digest", None, "digest of the plan"),
+    CatalogueColumn("differs", None, "keys of the plan that are not at their defaults, with their values"),
+    CatalogueColumn("diagnosis", None, "status of the diagnosis report (JSON) that names the recording"),
+    CatalogueColumn("verdict", None, "verdict of that report"),
+    CatalogueColumn("tags", None, "tags from the notes beside the recording"),
+    CatalogueColumn("notes", None, "notes beside the recording"),
+    CatalogueColumn("size", "B", "bytes of the file"),
 )
 NAMES = tuple(column.name for column in COLUMNS)
 BY_NAME = {column.name: column for column in COLUMNS}

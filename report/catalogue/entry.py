@@ -43,14 +43,14 @@ CODES: Mapping[str, str] = {
 }  # outcomes by the code in a recording's summary; every other code is that of a trip
 
 
-class Entry(NamedTuple):
+class CatalogueEntry(NamedTuple):
     """What the catalogue keeps of a recording."""
 
     facts: Facts
     peaks: list[Peak]
 
 
-def entry(path: Path, folder: Path) -> Entry:
+def entry(path: Path, folder: Path) -> CatalogueEntry:
     """The entry of a recording, named by its path from `folder`; one that cannot be read has state and damage only."""
     facts: Facts = dict.fromkeys(NAMES) | {"file": named(path, folder)}
     try:
@@ -58,9 +58,9 @@ def entry(path: Path, folder: Path) -> Entry:
         facts["tags"], facts["notes"] = noted(path)
         run = opened(path)
         facts |= of_run(run)
-        return Entry(facts, peaks(run))
+        return CatalogueEntry(facts, peaks(run))
     except (RthsError, OSError) as error:
-        return Entry(facts | {"state": UNREADABLE, "damage": str(error)}, [])
+        return CatalogueEntry(facts | {"state": UNREADABLE, "damage": str(error)}, [])
 
 
 def named(path: Path, folder: Path) -> str:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from common.errors import InputError
 from common.plan.schema import nearest
 from common.plan.units import in_si
-from report.catalogue.columns import BY_NAME, Column
+from report.catalogue.columns import BY_NAME, CatalogueColumn
 from report.catalogue.store import escaped
 
 TOKEN = re.compile(
@@ -52,7 +52,7 @@ def parsed(text: str, base: sqlite3.Connection) -> Condition:
     Raises:
         InputError: the text is no condition, or names a column, a signal or a unit that is not known.
     """
-    found = Parser(tokens(text), base)
+    found = ConditionParser(tokens(text), base)
     condition = found.either()
     if found.rest:
         raise InputError(f"The condition ends before '{found.rest[0]}': join conditions by 'and' or 'or'.")
@@ -74,7 +74,7 @@ def tokens(text: str) -> list[str]:
     return found
 
 
-class Parser:
+class ConditionParser:
     """Reads tokens from the first to the last; `rest` are those that are left."""
 
     def __init__(self, rest: list[str], base: sqlite3.Connection) -> None:
@@ -160,7 +160,7 @@ class Parser:
         return found
 
 
-def of_text(column: Column, operator: str, text: str) -> Condition:
+def of_text(column: CatalogueColumn, operator: str, text: str) -> Condition:
     """A comparison of a column of texts."""
     if operator == "~":
         return Condition(f"({column.name} LIKE ? ESCAPE '\\')", (f"%{escaped(text)}%",), (column.name,))

@@ -76,7 +76,7 @@ def forget(base: sqlite3.Connection, names: Iterable[str]) -> None:
         base.executemany(f"DELETE FROM {table} WHERE file = ?", [(name,) for name in names])  # noqa: S608 - constants
 
 
-def add(base: sqlite3.Connection, one: entry.Entry, stamped: str) -> None:
+def add(base: sqlite3.Connection, one: entry.CatalogueEntry, stamped: str) -> None:
     """Add an entry."""
     name, marks = one.facts["file"], ", ".join("?" * len(NAMES))
     base.execute(f"INSERT INTO recordings VALUES ({marks})", [one.facts[column] for column in NAMES])  # noqa: S608 - marks

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 from report.page import frame, render
 from report.several import pictures, tables
-from report.several.runs import Chosen, OneRun
+from report.several.runs import ChosenSignal, OneRun
 from report.text.terminal import TitledTable
 
 ACROSS = 7  # columns that fit on paper
 
 
-def page(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> str:
+def page(runs: Sequence[OneRun], signals: Sequence[ChosenSignal]) -> str:
     """The page's text."""
     body = render(
         "several.html",

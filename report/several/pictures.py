@@ -11,7 +11,7 @@ import numpy as np
 from report.page import data_uri
 from report.pictures import figure
 from report.run.drawing import INCH, DrawnPicture
-from report.several.runs import Chosen, OneRun
+from report.several.runs import ChosenSignal, OneRun
 from report.text.formats import axis_scale
 
 ROW = 1.35  # inches, the height of one signal's axes
@@ -19,7 +19,7 @@ NAMED = 12  # recordings that a legend can name; more are coloured in their orde
 PER_ROW = {figure.SINGLE: 2, figure.DOUBLE: 4}  # names in a row of the legend, by the figure's width
 
 
-def histories(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> DrawnPicture:
+def histories(runs: Sequence[OneRun], signals: Sequence[ChosenSignal]) -> DrawnPicture:
     """One row for each signal, narrow and wide."""
     (narrow, size), (wide, _) = (png(runs, signals, width) for width in PER_ROW)
     caption = "Histories over the time since the start of each recording."
@@ -30,7 +30,9 @@ def histories(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> DrawnPicture
     )
 
 
-def png(runs: Sequence[OneRun], signals: Sequence[Chosen], width: float) -> tuple[bytes, tuple[int, int]]:
+def png(
+    runs: Sequence[OneRun], signals: Sequence[ChosenSignal], width: float
+) -> tuple[bytes, tuple[int, int]]:
     """The picture's file and its CSS pixels."""
     names = len(runs) if len(runs) <= NAMED else 0
     legend = 0.16 * -(-names // PER_ROW[width])
@@ -59,7 +61,7 @@ def colours(count: int) -> list[Any]:
     return [colormaps["viridis"](share) for share in np.linspace(0.0, 0.92, count)]
 
 
-def row(axis: Any, runs: Sequence[OneRun], signal: Chosen, shades: Sequence[Any]) -> None:
+def row(axis: Any, runs: Sequence[OneRun], signal: ChosenSignal, shades: Sequence[Any]) -> None:
     """One signal of all recordings that have it."""
     here = [(run, shade) for run, shade in zip(runs, shades, strict=True) if signal.name in run.signals]
     size = max(float(np.nanmax(np.abs(run.signals[signal.name]), initial=0.0)) for run, _ in here)

@@ -41,7 +41,7 @@ class OneRun(NamedTuple):
     tracking: dict[str, dict[str, Any]]
 
 
-class Chosen(NamedTuple):
+class ChosenSignal(NamedTuple):
     """A signal that is shown, in a unit of which one is `factor` SI units; without a unit the scale is chosen later."""
 
     name: str
@@ -129,14 +129,14 @@ def named(topic: str, name: str) -> str:
     return f"{name_of(topic)}.{name}" if kind_of(topic) != MASTER and name_of(topic) else name
 
 
-def chosen(runs: Sequence[OneRun], words: Sequence[str]) -> list[Chosen]:
+def chosen(runs: Sequence[OneRun], words: Sequence[str]) -> list[ChosenSignal]:
     """The signals that words such as `drift` or `column_force:kN` choose; without any, the usual ones.
 
     Raises:
         InputError: no recording has such a signal, or its unit does not fit.
     """
     if not words:
-        return [Chosen(name) for name in dict.fromkeys(name for run in runs for name in run.usual)]
+        return [ChosenSignal(name) for name in dict.fromkeys(name for run in runs for name in run.usual)]
     units = {name: unit for run in runs for name, unit in run.units.items()}
     found = []
     for word in words:
@@ -146,5 +146,5 @@ def chosen(runs: Sequence[OneRun], words: Sequence[str]) -> list[Chosen]:
         from decimal import Decimal
 
         factor = converted(Decimal(1), unit, units[name], f"--signals {name}") if unit else 1.0
-        found.append(Chosen(name, unit, factor))
+        found.append(ChosenSignal(name, unit, factor))
     return found

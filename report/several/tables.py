@@ -10,7 +10,7 @@ import numpy as np
 from common.plan.plan import Plan
 from common.plan.plan_difference import VERSION, leaves
 from models.indicators import nrmse
-from report.several.runs import Chosen, OneRun
+from report.several.runs import ChosenSignal, OneRun
 from report.text.formats import quantity, tracked
 from report.text.terminal import TitledTable
 
@@ -18,18 +18,18 @@ NOTHING = "–"
 DEFAULT = "default"
 
 
-def shown(value: float, unit: str, signal: Chosen) -> str:
+def shown(value: float, unit: str, signal: ChosenSignal) -> str:
     """A value (SI) in the unit chosen, or with the prefix that suits it."""
     return f"{value / signal.factor:.4g} {signal.unit}" if signal.unit else quantity(value, unit)
 
 
-def all_of(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> list[TitledTable]:
+def all_of(runs: Sequence[OneRun], signals: Sequence[ChosenSignal]) -> list[TitledTable]:
     """All tables that have rows."""
     found = (peaks(runs, signals), differences(runs, signals), followed(runs), plans(runs))
     return [one for one in found if one.rows]
 
 
-def peaks(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> TitledTable:
+def peaks(runs: Sequence[OneRun], signals: Sequence[ChosenSignal]) -> TitledTable:
     """The circumstances of each recording and the largest magnitude of each signal."""
     rows = []
     for run in runs:
@@ -48,7 +48,7 @@ def peak(run: OneRun, name: str) -> float | None:
     return float(np.nanmax(np.abs(run.signals[name]), initial=0.0))
 
 
-def differences(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> TitledTable:
+def differences(runs: Sequence[OneRun], signals: Sequence[ChosenSignal]) -> TitledTable:
     """The rms of each signal's difference from the first recording over the rms there, at times that both have."""
     first = runs[0]
     rows = [[run.label, *(share(differing(first, run, one.name)) for one in signals)] for run in runs[1:]]
@@ -91,7 +91,9 @@ def plans(runs: Sequence[OneRun]) -> TitledTable:
     return TitledTable("Plans", ["key", *(run.label for run in runs)], rows)
 
 
-def long(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def long(
+    runs: Sequence[OneRun], signals: Sequence[ChosenSignal]
+) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """All histories as one table for other programs, and the units of its columns.
 
     The columns are `recording`, `t` (s since the start) and the signals in their units; the times are those of
@@ -120,7 +122,7 @@ def long(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> tuple[dict[str, n
     return columns, {"t": "s"} | {one.name: one.unit or units[one.name] for one in signals}
 
 
-def plain(runs: Sequence[OneRun], signals: Sequence[Chosen]) -> list[dict[str, Any]]:
+def plain(runs: Sequence[OneRun], signals: Sequence[ChosenSignal]) -> list[dict[str, Any]]:
     """All figures of the tables as plain values in SI units, one record for each recording."""
     return [
         {"recording": run.label, **run.facts}
