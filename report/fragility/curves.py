@@ -65,6 +65,8 @@ def gather(path: Path, quantity: str, limit: str, intensity: str, by: str) -> Cu
 
 def read(path: Path, columns: list[str]) -> pa.Table:
     """Columns of a table; raises InputError where it cannot be read, is empty, or lacks one."""
+    if not path.is_file():
+        raise InputError(f"There is no file {path}: give the table that rths sweep wrote.")
     try:
         schema = parquet.read_schema(path)
         for name in columns:
