@@ -30,10 +30,10 @@ from report.plan import classes, slips
 def facts(plan: Plan, file: Path) -> dict[str, Any]:
     """What a plan describes; raises InputError where it cannot be used."""
     motion = substructure.motion(plan)
+    built = foreign.checked(plan)  # first, because it fails at once where the model does
     found = findings(plan)
     rigs_there = [rig(one, plan) for one in probed(plan)]
     refusing = [one["risk"] for one in rigs_there if one["risk"]]
-    built = foreign.checked(plan)
     made = [*found.checks, *built, space.check(plan, existing(Path(plan.recording.folder)))]
     return {
         "plan": str(file),
