@@ -123,15 +123,16 @@ def yielding(stiffness: float, effects: ColumnEffects) -> Array:
     """Parameters of the law by which a column of that stiffness (N/m) yields, in the order of its kernel."""
     limit = bending(effects.yield_displacement)
     name = LAWS[int(effects.law)]
-    skeleton = [stiffness, limit, effects.hardening, effects.first_bend, effects.second_stiffness]
+    second = max(effects.second_stiffness, effects.hardening)  # a skeleton of three lines does not stiffen
+    skeleton = [stiffness, limit, effects.hardening, effects.first_bend, second]
     if name == "bouc_wen":
         return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.5, 0.5])
     if name == "menegotto_pinto":
         return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.925, 0.15])
     if name == "clough":  # which has no negative hardening
         return np.array([stiffness, limit, max(effects.hardening, 0.0), effects.unloading, 0.0, 0.0])
-    if name == "trilinear":  # whose sliders cannot push
-        return np.array([*skeleton[:-1], max(effects.second_stiffness, effects.hardening)])
+    if name == "trilinear":
+        return np.array(skeleton)
     if name.startswith("pinched"):
         corner = [effects.pinch_force, effects.pinch_displacement]
         return np.array([*skeleton, *corner, effects.unloading, effects.damage])

@@ -250,7 +250,9 @@ def parameters(model: str, x: Array, units: Array) -> dict[str, float]:
         values["gamma"] = 1.0 - values["beta"]
     if "closing" in values:
         values["hardening"] *= 1.0 - values["closing"]
-    if model == "trilinear":
+    if (
+        "second_stiffness" in values
+    ):  # a skeleton that stiffens would be told by a few peaks, and holds nowhere else
         values["second_stiffness"] = max(values["second_stiffness"], values["hardening"])
     return values
 
