@@ -136,6 +136,9 @@ def test_a_parameter_that_a_law_lacks_is_not_fitted() -> None:
         2: {"yield_displacement", "hardening", "exponent"},
         3: {"yield_displacement", "hardening", "unloading"},
         4: {"yield_displacement", "hardening", "first_bend", "second_stiffness"},
-        5: {"yield_displacement", *Driven.TRUE} - {"first_bend", "second_stiffness"},
-        6: {"yield_displacement", *Driven.TRUE},
+        **{
+            place: {"yield_displacement", *Driven.TRUE} - {"first_bend", "second_stiffness"}
+            for place in (5, 7, 9)
+        },
+        **{place: {"yield_displacement", *Driven.TRUE} for place in (6, 8, 10)},
     }
