@@ -66,7 +66,8 @@ class Page:
         self.latency = Latency(self.streams, window)
         self._motions = motions(self.streams, feed.laboratories, window)
         self.plots = {name: each.figure for name, each in self._motions.items()}
-        self.plots |= self.latency.parts if feed.roles else {}
+        if feed.roles and not all(feed.timing(role).instant for role in feed.roles):
+            self.plots |= self.latency.parts
         self._heading = Div(sizing_mode="stretch_width", name="heading")
         self._parting = parting(feed)
         self.slave = Select(title="slave", options=[], visible=False, width=200, name="slave")
