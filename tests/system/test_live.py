@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this 
 
 PLOTS = 5  # of the motion; those of the round trip are hidden in virtual time
 WIDE, NARROW = 1280, 390  # of a screen, CSS pixels
-SECONDS = 2.0  # in which the recording grows
+SECONDS = 4.0  # in which the recording grows
 # colours that a plot's canvas holds, as many as make a drawing: the canvases are in shadow trees
 DRAWN = """() => {
   const found = [];
