@@ -17,7 +17,7 @@ from models.registry import Array
 from simulation.sweep.fragility import Fragility, Stripe, fit, stripes
 
 
-class Curve(NamedTuple):
+class FragilityCurve(NamedTuple):
     """The curve of one group of tests, with the tests behind it."""
 
     name: str  # of the group, empty where all tests are one
@@ -35,7 +35,7 @@ class Curves(NamedTuple):
     intensity: str
     intensity_unit: str
     by: str
-    curves: list[Curve]
+    curves: list[FragilityCurve]
 
 
 def gather(path: Path, quantity: str, limit: str, intensity: str, by: str) -> Curves:
@@ -58,7 +58,7 @@ def gather(path: Path, quantity: str, limit: str, intensity: str, by: str) -> Cu
     for name in dict.fromkeys(groups):
         of_it = labels == name
         found.append(
-            Curve(name, fit(strength[of_it], passed[of_it]), stripes(strength[of_it], passed[of_it]))
+            FragilityCurve(name, fit(strength[of_it], passed[of_it]), stripes(strength[of_it], passed[of_it]))
         )
     return Curves(path.name, quantity, most, unit, intensity, unit_of(table, intensity), by, found)
 

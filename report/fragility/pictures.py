@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from report.fragility.curves import Curve, Curves
+from report.fragility.curves import Curves, FragilityCurve
 from report.fragility.tables import asked, shown
 from report.page import data_uri
 from report.pictures import figure
@@ -44,7 +44,7 @@ def png(found: Curves, width: float) -> tuple[bytes, tuple[int, int]]:
     return stream.getvalue(), (across, high)
 
 
-def draw(axes: Any, one: Curve, colour: str) -> None:
+def draw(axes: Any, one: FragilityCurve, colour: str) -> None:
     """One curve and its shares."""
     dots = shown(one)
     label = one.name or None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from report.fragility.curves import Curve, Curves
+from report.fragility.curves import Curves, FragilityCurve
 from report.text.formats import percent, probability, quantity
 from report.text.terminal import TitledTable
 from simulation.sweep.fragility import Stripe, chance
@@ -57,7 +57,7 @@ def missing(found: Curves) -> list[str]:
     return none + far
 
 
-def of(one: Curve) -> str:
+def of(one: FragilityCurve) -> str:
     """The name of a curve behind a noun."""
     return f" of '{one.name}'" if one.name else ""
 
@@ -71,7 +71,7 @@ def stripes(found: Curves) -> list[TitledTable]:
     ]
 
 
-def stripe_cells(found: Curves, one: Curve, each: Stripe) -> list[str]:
+def stripe_cells(found: Curves, one: FragilityCurve, each: Stripe) -> list[str]:
     """One row of the table of stripes."""
     curve = probability(float(chance(one.fit, np.array([each.intensity]))[0]) if one.fit.fitted else None)
     return [
@@ -83,7 +83,7 @@ def stripe_cells(found: Curves, one: Curve, each: Stripe) -> list[str]:
     ]
 
 
-def shown(one: Curve) -> list[Stripe]:
+def shown(one: FragilityCurve) -> list[Stripe]:
     """The stripes of a curve, gathered into at most `MOST_STRIPES` of neighbouring intensities (geometric means)."""
     if len(one.stripes) <= MOST_STRIPES:
         return one.stripes

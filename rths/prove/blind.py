@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from validation.blind.cases.basis import TrialBasis
     from validation.blind.cases.case import Case
-    from validation.blind.predicted.next_test import NextTest
+    from validation.blind.predicted.next_test import FollowingTest
     from validation.blind.predicted.predict import PredictedCase
     from validation.blind.progress import CasesDone
     from validation.blind.record import RecordedCase
@@ -216,7 +216,7 @@ def what(args: argparse.Namespace, trial: TrialBasis) -> dict[str, Any]:
 
 
 def predict_cases(
-    following: Sequence[NextTest],
+    following: Sequence[FollowingTest],
     recorded: dict[int, RecordedCase],
     place: Path,
     args: argparse.Namespace,

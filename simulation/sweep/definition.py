@@ -64,7 +64,7 @@ class DrawnTable:
 
 
 @dataclass(frozen=True)
-class Motion:
+class SweptMotion:
     """A record as `[ground_motion]` of the plan names it, the folder from which its path starts, and the factors."""
 
     ground_motion: Mapping[str, Any]
@@ -73,7 +73,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Compensator:
+class SweptCompensator:
     """A compensator with its name in the table, and the keys of `[compensator]`; none for that of the plan."""
 
     name: str
@@ -87,8 +87,8 @@ class Sweep:
     head: SweepTable
     intensity: IntensityTable
     plan: Plan
-    motions: tuple[Motion, ...]
-    compensators: tuple[Compensator, ...]
+    motions: tuple[SweptMotion, ...]
+    compensators: tuple[SweptCompensator, ...]
     parameters: Mapping[str, tuple[Any, ...]]  # values by the key of the plan, `table.key`
     drawn: Mapping[str, DrawnTable]
     base: Path  # from which the paths of the sweep start
@@ -199,14 +199,14 @@ def entries(tables: Mapping[str, Any], name: str, leaf: str = "") -> Iterator[tu
             yield first, value
 
 
-def motion(given: Mapping[str, Any], plan: Plan, base: Path) -> Motion:
+def motion(given: Mapping[str, Any], plan: Plan, base: Path) -> SweptMotion:
     """A `[[motion]]`; its record is the plan's where it gives none."""
     one = fill(MotionTable, {name: value for name, value in given.items() if name != "scales"}, "motion")
     own = plan.ground_motion
     factors = scales(given.get("scales", [own.scale]))
     if not one.record:
-        return Motion({"record": own.record, "dt": own.dt, "unit": own.unit}, plan.base, factors)
-    return Motion({"record": one.record, "dt": one.dt, "unit": one.unit}, base, factors)
+        return SweptMotion({"record": own.record, "dt": own.dt, "unit": own.unit}, plan.base, factors)
+    return SweptMotion({"record": one.record, "dt": one.dt, "unit": one.unit}, base, factors)
 
 
 def scales(given: object) -> tuple[float, ...]:
@@ -236,7 +236,7 @@ def scales(given: object) -> tuple[float, ...]:
     return tuple(map(float, found))
 
 
-def compensator(given: Mapping[str, Any]) -> Compensator:
+def compensator(given: Mapping[str, Any]) -> SweptCompensator:
     """A `[[compensator]]`: the plan's own where it gives nothing but a name."""
     keys = {name: value for name, value in given.items() if name != "name"}
     name = given.get("name", keys.get("kind", "as planned"))
@@ -244,7 +244,7 @@ def compensator(given: Mapping[str, Any]) -> Compensator:
         raise PlanError(f"name of a [[compensator]] is {name!r}, but must be text.")
     if keys and "kind" not in keys:
         raise PlanError(f"kind is missing in the [[compensator]] '{name}': give it.")
-    return Compensator(name, keys)
+    return SweptCompensator(name, keys)
 
 
 def values_of(name: str, given: object, written: Mapping[str, Any]) -> tuple[Any, ...]:

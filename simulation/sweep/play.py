@@ -50,7 +50,7 @@ class Excitation(NamedTuple):
     spectral: float  # m/s², 0 where no period is given
 
 
-class Stage:
+class SweepStage:
     """What the tests of a sweep share on one machine."""
 
     def __init__(self, given: Luggage) -> None:
@@ -82,7 +82,7 @@ class Stage:
 
 
 @lru_cache(maxsize=1)
-def stages() -> dict[str, Stage]:
+def stages() -> dict[str, SweepStage]:
     """The stages that this process has made, by the digest of their tasks."""
     return {}
 
@@ -97,15 +97,15 @@ def batch(task: Task) -> Batch:
     if task.digest not in kept:
         while len(kept) >= MOST_STAGES:
             kept.pop(next(iter(kept)), None)
-        kept[task.digest] = Stage(task.luggage)
-    stage = kept.get(task.digest) or Stage(task.luggage)  # another thread may have taken it out
+        kept[task.digest] = SweepStage(task.luggage)
+    stage = kept.get(task.digest) or SweepStage(task.luggage)  # another thread may have taken it out
     first = task.number * SIZE
     numbers = range(first, min(first + SIZE, stage.sweep.rows))
     found = [test(stage, rows.row(stage.sweep, number)) for number in numbers]
     return Batch(task.number, {name: [one[name] for one in found] for name in found[0]})
 
 
-def test(stage: Stage, one: Row) -> dict[str, Any]:
+def test(stage: SweepStage, one: Row) -> dict[str, Any]:
     """A row of the table."""
     sweep = stage.sweep
     try:
@@ -132,7 +132,7 @@ def test(stage: Stage, one: Row) -> dict[str, Any]:
     }
 
 
-def rollout(stage: Stage, plan: Plan, one: Row, strong: Excitation) -> Rollout:
+def rollout(stage: SweepStage, plan: Plan, one: Row, strong: Excitation) -> Rollout:
     """The closed loop of a test: of nominal models, or of the laboratories of the reality."""
     noise = stage.sweep.head.noise
     if not stage.reality:

@@ -15,7 +15,7 @@ from common.terminal.telling import Tell, untold
 from simulation.sweep import luggage, measures, rows
 from simulation.sweep.definition import Sweep
 from simulation.sweep.luggage import Luggage
-from simulation.sweep.play import SIZE, Stage, Task, batch, test
+from simulation.sweep.play import SIZE, SweepStage, Task, batch, test
 from simulation.workers.parts import Way, complete, parts, write
 from simulation.workers.versions import versions
 
@@ -28,7 +28,7 @@ def schema(sweep: Sweep, given: Luggage) -> pa.Schema:
     Raises:
         InputError: a combination of the sweep cannot be computed.
     """
-    stage = Stage(given)
+    stage = SweepStage(given)
     for number in range(0, sweep.rows, sweep.points * sweep.head.draws):
         rows.plan_of(stage.sweep, rows.row(sweep, number))
     for place in range(len(sweep.motions)):

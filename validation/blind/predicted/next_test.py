@@ -32,7 +32,7 @@ STRONGER = (0.5, 2.0)
 
 
 @dataclass(frozen=True)
-class NextTest:
+class FollowingTest:
     """A case with the plan of its next test, and with another draw of the noise."""
 
     case: Case
@@ -51,7 +51,7 @@ class PlayedTest:
     stopped: str  # why it ended early, empty where it was completed
 
 
-def next_test(case: Case, seed: int, set_: str, trial: TrialBasis) -> NextTest:
+def next_test(case: Case, seed: int, set_: str, trial: TrialBasis) -> FollowingTest:
     """The next test of a case; the motion is neither that of the diagnosed test nor that of its validation."""
     lot = (seed, set_, case.index)
     plan = plans.from_tables(case.plan, Path())
@@ -65,10 +65,10 @@ def next_test(case: Case, seed: int, set_: str, trial: TrialBasis) -> NextTest:
     tables = plan.tables()
     tables["ground_motion"] = {"record": record, "scale": round(scale, 4)}
     noise = int(lots.generator(*lot, "next noise").integers(2**31))
-    return NextTest(replace(case, plan=tables, seed=noise, other={}), stronger)
+    return FollowingTest(replace(case, plan=tables, seed=noise, other={}), stronger)
 
 
-def play(following: NextTest, folder: Path) -> PlayedTest:
+def play(following: FollowingTest, folder: Path) -> PlayedTest:
     """Play a next test in virtual time, once as it is and once without any noise; a limit may end it early."""
     case = following.case
     path = folder / f"{secrets.token_hex(8)}.mcap"

@@ -32,7 +32,7 @@ from simulation.prediction import bands, draws, file, held
 from simulation.prediction.rest import BEYOND, OUTSIDE
 from simulation.workers.pool import spread
 from validation.blind.cases.names import CaseNames
-from validation.blind.predicted.next_test import NextTest, PlayedTest, Readings, play
+from validation.blind.predicted.next_test import FollowingTest, PlayedTest, Readings, play
 from validation.blind.size import levels
 from validation.blind.worker import ENDINGS
 
@@ -66,7 +66,7 @@ class PredictedCase:
         return self.after / self.before if self.before > 0.0 else math.inf
 
 
-def predict(work: tuple[NextTest, Path], kept: Path | None = None) -> PredictedCase:
+def predict(work: tuple[FollowingTest, Path], kept: Path | None = None) -> PredictedCase:
     """Predict the next test of a case from the file of what was found, play it, and compare.
 
     Prediction, played test and the files of what was found are copied into a folder in `kept`, if given.
@@ -110,13 +110,13 @@ def predict(work: tuple[NextTest, Path], kept: Path | None = None) -> PredictedC
 
 
 def predict_all(
-    work: Sequence[tuple[NextTest, Path]], jobs: int = 1, kept: Path | None = None
+    work: Sequence[tuple[FollowingTest, Path]], jobs: int = 1, kept: Path | None = None
 ) -> Iterator[PredictedCase]:
     """As `predict`, for many cases, in the order in which they are ready; each is kept in a folder of its own."""
     yield from spread(partial(predict, kept=kept), work, jobs)
 
 
-def case_levels(following: NextTest, plan: Plan) -> dict[str, dict[str, float]]:
+def case_levels(following: FollowingTest, plan: Plan) -> dict[str, dict[str, float]]:
     """True rms noise of the readings by role and name."""
     return {role: levels(following.case, role) for role in kinds_of(plan)}
 
