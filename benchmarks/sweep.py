@@ -21,7 +21,7 @@ TESTS, QUICK_TESTS = 10_000, 64  # measured; the first takes half a minute with 
 
 def asked(tests: int) -> Sweep:
     """The default test under its motion at fifty scales, with damping, stiffness and specimen drawn."""
-    scales = min(50, tests // 64)
+    scales = max(2, min(50, tests // 64))
     return definition.from_tables(
         {
             "draws": tests // scales,

@@ -59,7 +59,7 @@ def settled(fit: Fit) -> Fit:
 
 def under_white(fit: Fit, data: Data, before: Data) -> Fit:
     """The fit under white noise: that of `before` where it is no lower."""
-    changed = bool(before.noise) or before.lines is not None or before.spikes is not None
+    changed = bool(before.noise) or data.lines is not None or data.spikes is not None
     data = data if changed or quieter(data, before) else replace(before, related=data.related)
     found = fitting.at(data, fit.values, fit.z)
     return fitting.polished(found) if found.names and leaves(found) else found

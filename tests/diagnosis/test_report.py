@@ -104,7 +104,8 @@ def test_a_report_says_nothing_of_the_case_but_the_files_name(cases: Cases, tmp_
     less = json.loads(json.dumps(report))
     less["details"]["test"].pop("file")
     assert json.dumps(again) == json.dumps(less)  # to the last byte, and the same in a second run
-    for text in (json.dumps(less), page.page(read.report(report)).replace(original.name, "")):
+    shown = re.sub(r"base64,[^\"']*", "", page.page(read.report(report))).replace(original.name, "")
+    for text in (json.dumps(less), shown):
         assert str(cases.folder) not in text
         assert str(original) not in text
         assert "reality" not in text.lower()

@@ -56,6 +56,8 @@ UNRUN = {
         "rths slave two_dampers --name middle --connect tcp/192.0.2.1:7447",
     ],
     "docs/reference/blind.md": [
+        "rths blind --predict --cases 24 --seed 21 --only catalogue,formula,unknown --duration 20",
+        "rths blind --predict --set materials --cases 8 --seed 3 --duration 20",
         "rths blind --set loggers --cases 90 --seed 17 -o runs/loggers",
         "rths blind --cases 240 --set judge --seed 2026 --jobs 2 -o runs/blind",
         "rths blind --cases 40 --set judge --seed 2026 --duration 20",
