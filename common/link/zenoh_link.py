@@ -48,11 +48,17 @@ ACCEPT_PENDING = 512
 # is larger than MOST_FRAME (a piece of the stream to the recorder has some 2 kB, 50 kB with 100 storeys), and the codec
 # rejects any that is; 4 kB more are for zenoh's header with the key. zenoh's default is 1 GiB.
 MOST_MESSAGE = MOST_FRAME + (1 << 12)
+# zenoh drops a connection without a handshake in its acceptor's threads, where each close waits some 40 ms for the
+# other end. With zenoh's single thread, a hundred connections dropped together kept the feedback out for over 50 ms;
+# with two threads no tick was late (row F51 of docs/reference/faults.md).
+RUNTIME = "(acc: (worker_threads: 2))"
 PREFIX = "rths"
 REFUSED = "zenoh_link_tls=warn"  # filter of zenoh's log that shows every refused TLS connection
 
 if TYPE_CHECKING:
     from common.link.security import Identity
+
+os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)  # which zenoh reads as the first session of a process opens
 
 
 def configuration(role: str, listen: str, connect: str) -> zenoh.Config:
