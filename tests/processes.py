@@ -12,6 +12,8 @@ from pathlib import Path
 
 from tests.helpers import ROOT
 
+# s, of waits that are to end a test that hangs, and nothing else: a host may stop this machine for half a minute
+HANG_S = 200.0
 OVER_S = 10.0  # for the last words of what was killed
 
 

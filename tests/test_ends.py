@@ -14,7 +14,7 @@ import pytest
 
 from tests import limited
 from tests.helpers import ROOT
-from tests.processes import environment, finished
+from tests.processes import HANG_S, environment, finished
 
 LIMITED = [sys.executable, "-I", str(ROOT / "tests" / "limited.py")]
 ELSEWHERE = (
@@ -53,7 +53,7 @@ def alive(pid: int) -> bool:
 
 def number_in(path: Path) -> int:
     """The process number that a process writes into a file as soon as it runs."""
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + HANG_S
     while not (path.exists() and path.read_text()):
         assert time.monotonic() < deadline
         time.sleep(0.02)
@@ -95,7 +95,7 @@ def test_nothing_outlives_who_limits_it(number: int, tmp_path: Path) -> None:
     with subprocess.Popen([*LIMITED, "it", "50", sys.executable, "-c", program], cwd=tmp_path) as limiting:
         pid = number_in(tmp_path / "number")
         limiting.send_signal(number)
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + HANG_S
     while alive(pid) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert not alive(pid)
@@ -132,7 +132,7 @@ def test_what_a_test_starts_is_killed_with_its_interpreter(tmp_path: Path) -> No
     with subprocess.Popen([sys.executable, "-c", program], cwd=tmp_path, env=environment()) as starting:
         pid = number_in(tmp_path / "number")
         os.kill(starting.pid, signal.SIGKILL)
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + HANG_S
     while alive(pid) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert not alive(pid)

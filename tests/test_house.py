@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rths.__main__ import VERBS, check_home
 from tests.helpers import ROOT
+from tests.processes import HANG_S
 
 README = (ROOT / "README.md").read_text()
 
@@ -88,7 +89,7 @@ def test_another_common_in_the_way_is_said_in_one_sentence(tmp_path: Path) -> No
         env={"PYTHONPATH": f"{tmp_path}:{ROOT}", "PATH": "/usr/bin:/bin"},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=HANG_S,
     )
     assert found.returncode == 2
     assert found.stderr.startswith("rths: another package named 'common'")

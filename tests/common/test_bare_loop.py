@@ -16,6 +16,7 @@ from common.host import bare_loop
 from common.host.bare_loop import BareLoop, Lateness
 from common.host.realtime import NOTHING, Granted
 from tests.helpers import ROOT
+from tests.processes import HANG_S
 
 INTERVAL_NS = 2_000_000
 
@@ -161,7 +162,7 @@ def test_it_runs_as_a_module_and_imports_next_to_nothing() -> None:
     text = f"import sys, common.host.bare_loop; print(sorted(set(sys.modules) & {heavy}))"
     environment = {"PYTHONPATH": str(ROOT)}
     bare = subprocess.run(
-        [sys.executable, "-S", "-c", text], capture_output=True, text=True, env=environment, timeout=60
+        [sys.executable, "-S", "-c", text], capture_output=True, text=True, env=environment, timeout=HANG_S
     )
     assert bare.stdout == "[]\n"
     done = subprocess.run(
@@ -170,7 +171,7 @@ def test_it_runs_as_a_module_and_imports_next_to_nothing() -> None:
         capture_output=True,
         text=True,
         env=environment,
-        timeout=60,
+        timeout=HANG_S,
     )
     ready, line = done.stdout.splitlines()
     assert ready == "ready"
@@ -180,7 +181,7 @@ def test_it_runs_as_a_module_and_imports_next_to_nothing() -> None:
         capture_output=True,
         text=True,
         env=environment,
-        timeout=60,
+        timeout=HANG_S,
     )
     assert refused.returncode == 2
     assert "is too short" in refused.stderr

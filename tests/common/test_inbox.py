@@ -7,6 +7,7 @@ import time
 
 from common.link.inbox import Inbox
 from common.link.transport import Packet
+from tests.processes import HANG_S
 
 
 def packet(number: int) -> Packet:
@@ -27,7 +28,7 @@ def test_frames_come_in_order_and_none_is_waited_for_too_long() -> None:
 def test_a_waiting_consumer_is_woken() -> None:
     inbox: Inbox[Packet] = Inbox()
     threading.Timer(0.05, inbox.put, [packet(7)]).start()
-    found, deadline = None, time.monotonic() + 5.0
+    found, deadline = None, time.monotonic() + HANG_S
     while found is None and time.monotonic() < deadline:
         found = inbox.get(5.0)
     assert found == packet(7)
@@ -44,7 +45,7 @@ def test_nothing_is_lost_between_several_producers_and_a_consumer() -> None:
     producers = [threading.Thread(target=produce) for _ in range(3)]
     for producer in producers:
         producer.start()
-    got, deadline = 0, time.monotonic() + 10.0
+    got, deadline = 0, time.monotonic() + HANG_S
     while got < 3 * each and time.monotonic() < deadline:
         got += inbox.get(0.01) is not None
     assert got == 3 * each

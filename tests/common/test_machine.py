@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from common.host import machine
+from tests.processes import HANG_S
 
 STAT = """cpu  100 10 50 800 5 3 7 40 0 0
 cpu0 50 5 25 400 3 2 3 10 0 0
@@ -140,5 +141,5 @@ def test_the_scheduler_of_a_process_is_named() -> None:
         os.sched_setscheduler(sleeper.pid, os.SCHED_BATCH, os.sched_param(0))
         assert machine.scheduler_name(sleeper.pid) == "batch"
     finally:
-        sleeper.communicate(timeout=10.0)
+        sleeper.communicate(timeout=HANG_S)
     assert machine.scheduler_name(sleeper.pid) == "unknown"

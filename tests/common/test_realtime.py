@@ -13,6 +13,7 @@ import pytest
 from common.errors import InputError
 from common.host import realtime
 from tests.helpers import ROOT
+from tests.processes import HANG_S
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="real-time scheduling is made for Linux here")
 
@@ -30,6 +31,7 @@ import gc, json, os, resource, sys, threading
 from common.terminal import cli
 from common.host import realtime
 from common.host.machine import scheduler_name
+from tests.processes import HANG_S
 def say(**values): print(json.dumps(values))
 {text}
 """
@@ -37,7 +39,7 @@ def say(**values): print(json.dumps(values))
         [sys.executable, "-c", lines],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=HANG_S,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
 

@@ -19,7 +19,7 @@ from common.plan.plan import Plan
 from common.reality import reality
 from simulation import virtual
 from tests.helpers import PATIENT, ROOT
-from tests.processes import environment, tied
+from tests.processes import HANG_S, environment, tied
 
 SESSION = 0x1D3A_57C9_E2B4_6F81  # no run of its bytes comes about by chance
 
@@ -97,7 +97,7 @@ def test_the_processes_say_nothing_of_their_session(tmp_path: Path, as_json: boo
         for module, more in words.items()
     ]
     try:
-        said = b"".join(part for process in processes for part in process.communicate(timeout=60.0))
+        said = b"".join(part for process in processes for part in process.communicate(timeout=HANG_S))
         assert [process.returncode for process in processes] == [0, 0, 0], said.decode()
     finally:
         for process in processes:

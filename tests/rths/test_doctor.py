@@ -19,6 +19,7 @@ from common.protocol import codec
 from common.protocol.messages import Command, Feedback
 from rths.checkup import children, clock, disk, exchange, rivals, verdict
 from tests.helpers import ROOT
+from tests.processes import HANG_S
 
 RTHS = [sys.executable, "-m", "rths", "doctor"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -188,7 +189,7 @@ def test_rivals_are_programs_with_a_priority(tmp_path: Path, monkeypatch: pytest
 
 @pytest.mark.parametrize("option", [("--seconds", "1"), ("--interval", "0"), ("--seconds", "nan")])
 def test_times_that_cannot_be_used_are_refused(option: tuple[str, str]) -> None:
-    done = subprocess.run([*RTHS, *option], capture_output=True, text=True, env=ENVIRONMENT, timeout=60)
+    done = subprocess.run([*RTHS, *option], capture_output=True, text=True, env=ENVIRONMENT, timeout=HANG_S)
     assert done.returncode == 2
     assert "cannot be used" in done.stderr
     assert "Traceback" not in done.stderr
@@ -197,7 +198,7 @@ def test_times_that_cannot_be_used_are_refused(option: tuple[str, str]) -> None:
 @pytest.mark.slow
 def test_a_short_check_has_all_parts_and_says_yes_or_no(tmp_path: Path) -> None:
     words = [*RTHS, "--seconds", "4", "--json", "-o", str(tmp_path / "runs")]
-    done = subprocess.run(words, capture_output=True, text=True, env=ENVIRONMENT, timeout=60)
+    done = subprocess.run(words, capture_output=True, text=True, env=ENVIRONMENT, timeout=HANG_S)
     assert done.returncode in (0, 1), done.stderr
     report = json.loads(done.stdout)
     assert {*GOOD, "checks", "notes", "verdict", "seconds"} <= set(report)
@@ -225,10 +226,10 @@ def test_a_check_that_is_ended_leaves_no_child(number: int, expected: int) -> No
         assert doctor.poll() is None
     time.sleep(0.5)
     doctor.send_signal(number)
-    _, complaint = doctor.communicate(timeout=30)
+    _, complaint = doctor.communicate(timeout=HANG_S)
     assert doctor.returncode == expected
     assert "Traceback" not in complaint
-    deadline = time.monotonic() + 15.0
+    deadline = time.monotonic() + HANG_S
     while alive := [pid for pid in left if running(pid)]:
         assert time.monotonic() < deadline, alive
         time.sleep(0.05)

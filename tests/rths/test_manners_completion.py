@@ -18,7 +18,7 @@ from common.terminal.cli import SHIPPED
 from rths.__main__ import VERBS, parser_for
 from rths.completion import SHELLS, script
 from tests.helpers import ROOT
-from tests.processes import finished
+from tests.processes import HANG_S, finished
 
 SLOW = ("numba", "scipy", "matplotlib", "zenoh")
 ASKED = {
@@ -61,7 +61,7 @@ def test_bash_completes_verbs_options_choices_plans_and_files(folder: Path) -> N
         *(f"ask {words!r}" for words in ASKED),
     ]
     done = subprocess.run(
-        ["bash", "--norc", "-c", "\n".join(lines)], cwd=folder, capture_output=True, text=True, timeout=60
+        ["bash", "--norc", "-c", "\n".join(lines)], cwd=folder, capture_output=True, text=True, timeout=HANG_S
     )
     registered, *answers = done.stdout.splitlines()
     assert registered == "complete -o bashdefault -F _shtab_rths rths"
@@ -126,7 +126,7 @@ def on_a_terminal(command: list[str], folder: Path) -> str:
         )
     finally:
         os.close(its)
-    said, deadline = b"", time.monotonic() + 60.0
+    said, deadline = b"", time.monotonic() + HANG_S
     try:
         while process.poll() is None:
             assert time.monotonic() < deadline, said
@@ -177,7 +177,7 @@ def test_a_script_is_written_without_the_packages_that_take_long_to_load() -> No
         f"sys.stderr.write(' '.join(name for name in {SLOW} if name in sys.modules))"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=HANG_S
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert "complete -o bashdefault" in done.stdout

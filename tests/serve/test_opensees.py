@@ -24,6 +24,7 @@ from master.client.pace import AsFastAsItGoes
 from simulation import virtual
 from tests.helpers import ROOT
 from tests.opensees import lacking
+from tests.processes import HANG_S
 from tests.serve.client import PATIENCE_S, free_port
 from tests.serve.serving import ALONE, plan_of
 
@@ -47,7 +48,7 @@ def opensees(*words: object) -> subprocess.Popen[str]:
 
 def answered(process: subprocess.Popen[str]) -> Any:
     """Displacements (steps, laboratories) m."""
-    said, complaint = process.communicate(timeout=60.0)
+    said, complaint = process.communicate(timeout=HANG_S)
     lines = [line for line in said.splitlines() if line.startswith("{")]
     assert lines, complaint
     return np.array(json.loads(lines[-1])["found"])

@@ -12,6 +12,7 @@ import pytest
 
 from common.recording.reader import read
 from tests.helpers import PATIENT, ROOT
+from tests.processes import HANG_S
 from tests.serve.client import free_port
 
 CLIENT = ROOT / "benchmarks" / "opensees" / "client.py"
@@ -36,8 +37,8 @@ def started(folder: Path, steps: int) -> tuple[subprocess.Popen[str], subprocess
 def test_a_test_in_real_time_ends_with_its_client(tmp_path: Path) -> None:
     server, client = started(tmp_path, STEPS)
     with server, client:
-        said, complaint = server.communicate(timeout=120.0)
-        assert client.wait(timeout=10.0) == 0
+        said, complaint = server.communicate(timeout=HANG_S)
+        assert client.wait(timeout=HANG_S) == 0
     assert server.returncode == 0, complaint
     assert "outcome: completed" in said
     of = read(tmp_path / "test.mcap").columns["master"]
@@ -54,7 +55,7 @@ def test_a_client_that_is_killed_in_real_time_is_said_in_one_sentence(tmp_path: 
             if line.startswith("t "):  # it runs
                 break
         client.send_signal(signal.SIGKILL)
-        said, complaint = server.communicate(timeout=120.0)
+        said, complaint = server.communicate(timeout=HANG_S)
     assert server.returncode == 4
     last = complaint.strip().splitlines()[-1]
     assert last.startswith("rths: The client at 127.0.0.1:")

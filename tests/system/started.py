@@ -12,21 +12,40 @@ from typing import Any
 
 from common.recording.reader import read
 from tests.helpers import PATIENT
-from tests.processes import environment, tied
+from tests.processes import HANG_S, environment, tied
+
+STARTED: list[subprocess.Popen[str]] = []  # by the test that runs
 
 
 def start(*words: str | Path, module: str = "rths", **options: Any) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        tied(sys.executable, "-m", module, *words),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(),
-        **options,
+    STARTED.append(
+        subprocess.Popen(
+            tied(sys.executable, "-m", module, *words),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment(),
+            **options,
+        )
     )
+    return STARTED[-1]
 
 
-def finish(process: subprocess.Popen[str], seconds: float = 60.0) -> tuple[int, str, str]:
+def end_started() -> list[str]:
+    """End what `start` has started and close its pipes; the command lines of what still ran.
+
+    A pipe that stays open would fail another test, in which it is collected.
+    """
+    left = [" ".join(process.args) for process in STARTED if process.poll() is None]
+    for process in STARTED:
+        process.kill()
+        with process:  # which closes the pipes
+            pass
+    STARTED.clear()
+    return left
+
+
+def finish(process: subprocess.Popen[str], seconds: float = HANG_S) -> tuple[int, str, str]:
     out, err = process.communicate(timeout=seconds)
     return process.returncode, out, err
 
@@ -49,7 +68,7 @@ def plan_file(folder: Path, **link: float) -> Path:
 
 def crew(process: subprocess.Popen[str]) -> dict[str, int]:
     """Process numbers of master, slave and recorder of a run, as soon as all are there."""
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + HANG_S
     found: dict[str, int] = {}
     while set(found) != {"master", "slave", "recorder"}:
         assert time.monotonic() < deadline, found
@@ -75,15 +94,13 @@ def gone(number: int) -> bool:
         return True
 
 
-def wait_for_ticks(path: Path, ticks: int = 200, seconds: float = 30.0) -> None:
+def wait_for_ticks(path: Path, ticks: int = 200, seconds: float = HANG_S) -> None:
     """Until a recording that is being written holds some ticks."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
         if path.exists() and path.stat().st_size > 10_000:
-            try:
+            with contextlib.suppress(Exception):  # a chunk that is being written
                 if read(path).ticks("master") >= ticks:
                     return
-            except Exception:
-                continue
         time.sleep(0.1)
     raise AssertionError(f"no {ticks} ticks in {path} after {seconds} s")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.helpers import ROOT
-from tests.processes import environment
+from tests.processes import HANG_S, environment
 
 THREADS = """
 import zenoh
@@ -28,7 +28,7 @@ def test_connections_are_taken_in_two_threads_so_that_a_close_that_waits_holds_u
         [sys.executable, "-c", THREADS],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=HANG_S,
         cwd=ROOT,
         env=environment(),
         check=False,

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.cable import ADDRESSES, NoCableError, cable
-from tests.processes import environment, tied
+from tests.processes import HANG_S, environment, tied
 
 pytestmark = [
     pytest.mark.slow,
@@ -96,7 +96,7 @@ def parts(user: Path, table: str) -> int:
 
 
 def wait_for(command: subprocess.Popen[bytes], user: Path, table: str, least: int) -> None:
-    until = time.monotonic() + 100.0
+    until = time.monotonic() + HANG_S
     while parts(user, table) < least:
         late = time.monotonic() > until or command.poll() is not None
         assert not late, (user / f"{table}.log").read_text()

@@ -8,7 +8,7 @@ import subprocess
 import pytest
 
 from tests.helpers import ROOT
-from tests.processes import finished
+from tests.processes import HANG_S, finished
 
 pytestmark = pytest.mark.slow
 
@@ -19,7 +19,7 @@ SKIPPED = 77
 def test_the_services_leave_a_whole_recording() -> None:
     if (
         shutil.which("docker") is None
-        or subprocess.run(["docker", "info"], capture_output=True, timeout=60).returncode != 0
+        or subprocess.run(["docker", "info"], capture_output=True, timeout=HANG_S).returncode != 0
     ):
         pytest.skip("no container engine runs here: see tests/system/compose_check.sh --start-engine")
     check = finished(ROOT / "tests" / "system" / "compose_check.sh", seconds=900.0)

@@ -16,6 +16,7 @@ import pytest
 
 from common.recording.reader import read
 from tests.helpers import PATIENT, patient
+from tests.processes import HANG_S
 from tests.system.started import crew, finish, free_port, gone, plan_file, start, wait_for_ticks
 
 
@@ -24,7 +25,7 @@ def test_ctrl_c_stops_in_order_and_keeps_the_recording(tmp_path: Path) -> None:
     process = start("run", patient(path.parent), "--duration", "60", "-o", path)
     wait_for_ticks(path)
     process.send_signal(signal.SIGINT)
-    code, out, err = finish(process, 20.0)
+    code, out, err = finish(process)
     assert code == 3, err
     assert "stopped by the user" in err
     assert "Traceback" not in out + err
@@ -41,7 +42,7 @@ def test_a_killed_front_door_ends_the_test_in_order(tmp_path: Path) -> None:
     wait_for_ticks(path)
     process.kill()
     process.communicate()
-    deadline = time.monotonic() + 15.0
+    deadline = time.monotonic() + HANG_S
     while not read(path).finished and time.monotonic() < deadline:
         time.sleep(0.2)
     recording = read(path)
@@ -75,7 +76,7 @@ def test_a_front_door_killed_in_the_first_moments_leaves_nobody(seconds: float, 
     time.sleep(seconds)
     process.kill()
     process.communicate()
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + HANG_S
     while not all(map(gone, numbers)) and time.monotonic() < deadline:
         time.sleep(0.1)
     assert all(map(gone, numbers))
@@ -84,18 +85,18 @@ def test_a_front_door_killed_in_the_first_moments_leaves_nobody(seconds: float, 
 @LINUX
 def test_a_killed_slave_is_noticed_by_the_master_and_named(tmp_path: Path) -> None:
     path, planned = tmp_path / "a.mcap", tmp_path / "plan.toml"
-    planned.write_text(PATIENT + "[link]\nloss_timeout = 1.0\n[recording]\npatience = 1.0\n")
+    planned.write_text(PATIENT + "[link]\nloss_timeout = 3.0\n[recording]\npatience = 1.0\n")
     process = start("run", planned, "--duration", "60", "-o", path)
     numbers = crew(process)
     wait_for_ticks(path)
     os.kill(numbers["slave"], signal.SIGKILL)
-    code, _, err = finish(process, 20.0)
+    code, _, err = finish(process)
     assert code == 4, err
     assert "The slave was killed (signal 9)" in err.splitlines()[-1]
     recording = read(path)
     assert recording.finished
     assert recording.metadata["summary"]["outcome"] == "lost"
-    assert recording.metadata["summary"]["cause"] == "The slave has been silent for 1 s."
+    assert recording.metadata["summary"]["cause"] == "The slave has been silent for 3 s."
     assert recording.ticks("master") >= recording.ticks("slave") + 300  # those until it was noticed
     assert recording.sequences["master"].tolist() == list(range(recording.ticks("master")))
 
@@ -104,7 +105,7 @@ def test_a_killed_slave_is_noticed_by_the_master_and_named(tmp_path: Path) -> No
 @LINUX
 def test_a_run_with_a_slave_that_hangs_ends_all_the_same(tmp_path: Path) -> None:
     path, planned = tmp_path / "a.mcap", tmp_path / "plan.toml"
-    planned.write_text(PATIENT + "[link]\nloss_timeout = 1.0\n[recording]\npatience = 1.0\n")
+    planned.write_text(PATIENT + "[link]\nloss_timeout = 3.0\n[recording]\npatience = 1.0\n")
     process = start("run", planned, "--duration", "60", "-o", path)
     numbers = crew(process)
     wait_for_ticks(path)
@@ -112,7 +113,7 @@ def test_a_run_with_a_slave_that_hangs_ends_all_the_same(tmp_path: Path) -> None
     for _ in range(2):
         process.send_signal(signal.SIGINT)
         time.sleep(0.6)
-    code, _, err = finish(process, 60.0)  # the slave is not killed before its deadline for coming to rest
+    code, _, err = finish(process)  # the slave is not killed before its deadline for coming to rest
     assert code == 4, err
     assert "already stopping" in err
     assert "The slave did not come to rest and leave in time and was killed" in err.splitlines()[-1]
@@ -140,10 +141,10 @@ def three(tmp_path: Path) -> Iterator[dict[str, subprocess.Popen[str]]]:
 def test_a_killed_slave_ends_the_test_with_exit_code_4(three: dict[str, Any], tmp_path: Path) -> None:
     wait_for_ticks(tmp_path / "a.mcap")
     three["slave"].kill()
-    code, _, err = finish(three["master"], 20.0)
+    code, _, err = finish(three["master"])
     assert code == 4
     assert "The slave has been silent for 0.5 s." in err
-    code, _, err = finish(three["recorder"], 20.0)
+    code, _, err = finish(three["recorder"])
     assert code == 1  # the slave took its last rows with it
     assert "The end of the stream of the slave did not reach the recorder." in err
     assert read(tmp_path / "a.mcap").finished
@@ -153,10 +154,10 @@ def test_a_killed_slave_ends_the_test_with_exit_code_4(three: dict[str, Any], tm
 def test_a_killed_master_ends_the_slave_with_exit_code_4(three: dict[str, Any], tmp_path: Path) -> None:
     wait_for_ticks(tmp_path / "a.mcap")
     three["master"].kill()
-    code, _, err = finish(three["slave"], 20.0)
+    code, _, err = finish(three["slave"])
     assert code == 4
     assert "The master has been silent for 0.5 s." in err
-    code, _, _ = finish(three["recorder"], 20.0)
+    code, _, _ = finish(three["recorder"])
     assert code == 4
     assert read(tmp_path / "a.mcap").ticks("slave") > 0
 
@@ -172,7 +173,7 @@ def test_a_killed_recorder_loses_a_second_at_most(three: dict[str, Any], tmp_pat
     assert recording.metadata["plan"]["toml"]
     assert killed - recording.log_ns["master"][-1] * 1e-9 < 1.0
     assert recording.sequences["master"].tolist() == list(range(recording.ticks("master")))
-    code, _, err = finish(three["master"], 20.0)
+    code, _, err = finish(three["master"])
     assert code == 4
     assert "recorder" in err
 
@@ -194,15 +195,14 @@ def test_plans_that_differ_are_refused_with_exit_code_2(tmp_path: Path) -> None:
 
 def test_nobody_there_is_exit_code_4_in_the_time_the_plan_allows(tmp_path: Path) -> None:
     plan = plan_file(tmp_path, connect_timeout=1.0)
-    began = time.monotonic()
     master = start(plan, "--listen", f"tcp/127.0.0.1:{free_port()}", module="master")
     slave = start(plan, "--connect", f"tcp/127.0.0.1:{free_port()}", module="slave")
     for process, sentence in ((master, "No slave joined"), (slave, "No master was reached")):
-        code, _, err = finish(process, 20.0)
+        code, _, err = finish(process)
         assert code == 4
         assert sentence in err
+        assert "within 1 s: " in err
         assert "Traceback" not in err
-    assert time.monotonic() - began < 15.0
 
 
 @pytest.mark.slow
@@ -216,7 +216,7 @@ def test_ctrl_c_before_the_other_is_there_ends_soon(tmp_path: Path) -> None:
     for process in processes:
         process.send_signal(signal.SIGINT)
     for process in processes:
-        code, _, err = finish(process, 20.0)
+        code, _, err = finish(process)
         assert code == 3, err
         assert "Traceback" not in err
 

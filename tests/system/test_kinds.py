@@ -43,7 +43,7 @@ def test_ctrl_c_unloads_the_column_of_a_slave(tmp_path: Path) -> None:
     process = start("run", "two_columns", "--scale", "0.5", "-o", path)
     wait_for_ticks(path, 1000)
     process.send_signal(signal.SIGINT)
-    code, out, err = finish(process, 20.0)
+    code, out, err = finish(process)
     assert code == 3, out + err
     recording = read(path)
     assert unloaded(recording, "master")

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import environment, finished, tied
+from tests.processes import HANG_S, environment, finished, tied
 
 # real-time priority above everything of the test: for 30 ms every half second nothing else runs on the processor
 BURNER = """
@@ -53,7 +53,7 @@ def burners() -> Iterator[None]:
 
 
 def test_a_user_without_rights_completes_the_test_on_a_machine_that_pauses_it(tmp_path: Path) -> None:
-    if os.geteuid() != 0 or subprocess.run(MAY_TAKE_PROCESSORS, check=False, timeout=30).returncode:
+    if os.geteuid() != 0 or subprocess.run(MAY_TAKE_PROCESSORS, check=False, timeout=HANG_S).returncode:
         pytest.skip("only root may take the processors away with FIFO 99")
     if not all(map(shutil.which, ("setpriv", "chrt", "prlimit", "taskset"))):
         pytest.skip("setpriv, chrt, prlimit and taskset of util-linux are needed")

@@ -19,7 +19,7 @@ import pytest
 from common.link.zenoh_link import listenable
 from common.recording.reader import read
 from tests.helpers import patient
-from tests.processes import environment, tied
+from tests.processes import HANG_S, environment, tied
 
 pytestmark = pytest.mark.slow
 
@@ -99,7 +99,7 @@ def start(*words: str | Path, before: list[str] | None = None) -> subprocess.Pop
 def time_namespaces() -> None:
     if (
         shutil.which("unshare") is None
-        or subprocess.run([*APART, "true"], capture_output=True, timeout=30).returncode
+        or subprocess.run([*APART, "true"], capture_output=True, timeout=HANG_S).returncode
     ):
         pytest.skip("time namespaces are not allowed here")
 
@@ -141,7 +141,7 @@ def medians(folder: Path, way: str, names: Sequence[str]) -> dict[str, tuple[flo
             if '"running"' in line or '"progress"' in line:
                 relay.slow_from = time.monotonic() + SINCE
                 break
-        errors = [process.communicate(timeout=60)[1] for process in processes]
+        errors = [process.communicate(timeout=HANG_S)[1] for process in processes]
     finally:
         for process in processes:
             process.kill()

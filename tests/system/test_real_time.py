@@ -133,7 +133,7 @@ def test_a_rig_that_prints_holds_nobody_up(tmp_path: Path) -> None:
     (tmp_path / "loud.py").write_text(LOUD)
     plan = tmp_path / "loud.toml"
     plan.write_text(f"[test]\nduration = 1.0\n{PATIENT}[master.rig]\nclass = 'loud.py:Loud'\n")
-    code, _, err = finish(start("run", plan, "-o", tmp_path / "a.mcap"), 30.0)
+    code, _, err = finish(start("run", plan, "-o", tmp_path / "a.mcap"))
     assert code == 0, err[-1000:]
     assert "master: valve 9999\n" in err
     assert err.count("reading 4\n") >= 500  # and on the ramp to rest

@@ -15,7 +15,7 @@ from common.host.realtime import PRIORITY
 from common.link.zenoh_link import listenable
 from common.recording.reader import read
 from common.recording.run import MACHINES
-from tests.processes import environment, tied
+from tests.processes import HANG_S, environment, tied
 
 pytestmark = pytest.mark.slow
 
@@ -24,7 +24,7 @@ ALLOWED = subprocess.run(
     [sys.executable, "-c", f"import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param({PRIORITY}))"],
     capture_output=True,
     check=False,
-    timeout=30,
+    timeout=HANG_S,
 )
 fifo = pytest.mark.skipif(
     ALLOWED.returncode != 0, reason="real-time priority is not allowed here: run as root"
@@ -34,7 +34,9 @@ fifo = pytest.mark.skipif(
 def machines(path: Path, *words: str) -> dict[str, str]:
     """What the recording of a short test says of its machines."""
     command = [*RTHS, "run", "--duration", "1", *words, "-o", str(path)]
-    subprocess.run(command, cwd=path.parent, env=environment(), check=True, capture_output=True, timeout=90)
+    subprocess.run(
+        command, cwd=path.parent, env=environment(), check=True, capture_output=True, timeout=HANG_S
+    )
     return read(path).metadata.get(MACHINES, {})
 
 
@@ -85,7 +87,7 @@ def test_the_threads_of_the_link_inherit_the_priority() -> None:
     ]  # they wait for a recorder
     try:
         for laboratory in laboratories:
-            deadline = time.monotonic() + 30.0
+            deadline = time.monotonic() + HANG_S
             found: dict[str, int] = {}
             while not {name[:3] for name in found} >= {"rx-", "tx-"} and time.monotonic() < deadline:
                 time.sleep(0.1)

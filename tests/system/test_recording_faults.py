@@ -19,6 +19,7 @@ from recorder import space
 from report.facts.laboratories import plan_of
 from tests.faults.rows import passed
 from tests.helpers import PATIENT
+from tests.processes import HANG_S
 from tests.system.started import crew, finish, start, wait_for_ticks
 
 pytestmark = [
@@ -46,7 +47,7 @@ def stop(process: subprocess.Popen[str]) -> None:
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
             time.sleep(0.3)
-    finish(process, 40.0)
+    finish(process)
 
 
 def test_a_killed_recorder_loses_less_than_a_tenth_of_a_second(tmp_path: Path) -> None:
@@ -86,12 +87,12 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
         ["mount", "-t", "tmpfs", "-o", "size=700k", "tmpfs", str(folder)],
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=HANG_S,
     )
     if mounted.returncode:
         pytest.skip(f"no disk can be mounted here: {mounted.stderr.strip()}")
     yield folder
-    subprocess.run(["umount", "--lazy", str(folder)], check=True, timeout=30)
+    subprocess.run(["umount", "--lazy", str(folder)], check=True, timeout=HANG_S)
 
 
 def test_a_full_disk_stops_the_test_in_order_and_leaves_what_was_written(
@@ -140,7 +141,7 @@ def test_a_recorder_that_is_held_up_for_seven_seconds_gets_what_it_missed(tmp_pa
     os.kill(recorder, signal.SIGSTOP)
     time.sleep(7.0)
     os.kill(recorder, signal.SIGCONT)
-    code, out, err = finish(process, 60.0)
+    code, out, err = finish(process)
     assert code == 0, out + err
     run = read(path)
     summary = run.metadata["summary"]

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from common.recording.reader import read
-from tests.processes import environment, tied
+from tests.processes import HANG_S, environment, tied
 
 LAB = """
 import json, pathlib
@@ -112,7 +112,7 @@ def test_a_second_ctrl_c_leaves_the_specimen_unloaded_the_rig_disarmed_and_the_r
         process.send_signal(signal.SIGINT)
         time.sleep(0.15)
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=50.0)
+        _, err = process.communicate(timeout=HANG_S)
     assert process.returncode == 3, err
     assert "already stopping; no laboratory is killed while it arms or is on its ramp to rest" in err
     assert err.rstrip().endswith("stopped by the user (SIGINT).")

@@ -115,10 +115,10 @@ def test_a_killed_slave_of_two_ends_the_test_with_exit_code_4_and_is_named(
     master = by_hand("master")
     wait_for_ticks(tmp_path / "a.mcap")
     middle.kill()
-    code, _, err = finish(master, 20.0)
+    code, _, err = finish(master)
     assert code == 4
     assert "The slave 'middle' has been silent for 0.5 s." in err
-    code, _, err = finish(roof, 20.0)
+    code, _, err = finish(roof)
     assert code == 3
     assert "The master stopped the test: The slave 'middle' has been silent for 0.5 s." in err
 
@@ -129,7 +129,7 @@ def test_the_second_slave_of_a_name_is_refused_and_the_test_goes_on(by_hand: Sta
     by_hand("recorder", "-o", tmp_path / "a.mcap")
     master = by_hand("master")
     wait_for_ticks(tmp_path / "a.mcap")
-    code, _, err = finish(by_hand("slave", "--name", "roof"), 20.0)
+    code, _, err = finish(by_hand("slave", "--name", "roof"))
     assert code == 2, err
     assert "Another slave 'roof' takes part in this test already: stop one of the two" in err
     assert "Traceback" not in err

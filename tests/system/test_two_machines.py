@@ -14,7 +14,7 @@ import pytest
 from benchmarks.cable import ADDRESSES, NoCableError, cable, ip
 from common.recording.reader import read
 from tests.helpers import PATIENT, ROOT, patient
-from tests.processes import environment, tied
+from tests.processes import HANG_S, environment, tied
 
 pytestmark = pytest.mark.slow
 
@@ -45,7 +45,7 @@ def await_all(processes: dict[str, subprocess.Popen[str]]) -> None:
     """All end, and with 0."""
     try:
         for name, process in processes.items():
-            _, err = process.communicate(timeout=90)
+            _, err = process.communicate(timeout=HANG_S)
             assert process.returncode == 0, f"{name}: {err}"
     finally:
         for process in processes.values():
@@ -106,7 +106,7 @@ def test_a_cable_that_is_pulled_ends_both_with_exit_code_4(machines: tuple[str, 
                 break
         ip("-n", second, "link", "set", f"rvb{os.getpid()}", "down")
         for process, who in ((master, "The slave"), (slave, "The master")):
-            _, err = process.communicate(timeout=30)
+            _, err = process.communicate(timeout=HANG_S)
             assert process.returncode == 4, err
             assert f"{who} has been silent for 0.3 s." in err
             assert "Traceback" not in err

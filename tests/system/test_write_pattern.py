@@ -20,6 +20,7 @@ import pytest
 from common.link.endpoint import FrameEndpoint
 from common.link.zenoh_link import ZenohLink, listenable
 from common.protocol.messages import Command, Feedback, Message
+from tests.processes import HANG_S
 
 SESSION, DIGEST = 1, "plan"
 EXCHANGES = 60
@@ -100,7 +101,7 @@ def test_a_frame_is_one_write_and_waits_for_no_acknowledgement(
     ends: tuple[FrameEndpoint, FrameEndpoint, Relay],
 ) -> None:
     master, slave, relay = ends
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + HANG_S
     while time.monotonic() < deadline:  # until both know of each other
         master.send(COMMAND)
         if heard(slave, Command, 0.1):

@@ -13,6 +13,7 @@ import pytest
 from common.recording.reader import length
 from report.live.feed import Feed
 from tests.helpers import ROOT
+from tests.processes import HANG_S
 
 
 @pytest.mark.parametrize(
@@ -88,5 +89,5 @@ def test_ctrl_c_ends_it_with_exit_code_0(virtual_recording: Path) -> None:
         assert process.stdout is not None
         assert process.stdout.readline().startswith("live view: http://127.0.0.1:")
         process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=30.0) == ("", "")
+        assert process.communicate(timeout=HANG_S) == ("", "")
         assert process.returncode == 0

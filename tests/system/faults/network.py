@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import pytest
 
+from tests.processes import HANG_S
 from tests.system.faults.bench import Place
 
 ADDRESSES = ("10.83.0.1", "10.83.0.2")
@@ -20,7 +21,7 @@ PORT = 7447
 
 def run(*words: str) -> str:
     """Run a command; what it wrote; raises CalledProcessError where it complains."""
-    return subprocess.run(words, check=True, capture_output=True, text=True, timeout=30).stdout
+    return subprocess.run(words, check=True, capture_output=True, text=True, timeout=HANG_S).stdout
 
 
 class Network(NamedTuple):

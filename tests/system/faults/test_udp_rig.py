@@ -19,7 +19,7 @@ from common.udp.packets import RigState
 from common.udp.peer import Peer
 from common.udp.rig import Terms, echoes
 from tests.helpers import ROOT
-from tests.processes import environment
+from tests.processes import HANG_S, environment
 from tests.system.faults.bench import INTERVAL, undisturbed
 
 pytestmark = pytest.mark.faults
@@ -69,7 +69,7 @@ def running(folder: Path) -> Iterator[tuple[subprocess.Popen[str], subprocess.Po
 
 def wait_for(path: Path, word: str) -> None:
     """Until a file has a word."""
-    end = time.monotonic() + 90.0
+    end = time.monotonic() + HANG_S
     while word not in path.read_text():
         assert time.monotonic() < end, path.read_text()
         time.sleep(0.05)
