@@ -1,15 +1,42 @@
-"""What a laboratory does at an operator's request: stop in order, stop at once, reset."""
+"""What a laboratory does at an operator's request: stop in order, stop at once, reset.
+
+`ORDERS` holds every request that there is, with the roles that answer it. `rths.perform.operate` sends one, numbers it
+and collects the answers; its docstring says how.
+"""
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
 
 from common.errors import EmergencyStopError
 from common.lab.laboratory import Laboratory
 from common.protocol.messages import Answer, Operator
+from common.roles import MASTER
 
 STOP, EMERGENCY, RESET = "stop", "emergency", "reset"
-WORDS = (STOP, EMERGENCY, RESET)
+
+
+class Order(NamedTuple):
+    """A request that an operator may make of a test."""
+
+    word: str  # in messages and in the recording
+    says: str  # what it does, in a few words that continue "rths ..."
+    everywhere: bool = True  # whether every laboratory does and answers it, or the master alone
+
+    def answered_by(self, slaves: Sequence[str]) -> tuple[str, ...]:
+        """The roles that answer it in a test with these slaves."""
+        return (MASTER, *slaves) if self.everywhere else (MASTER,)
+
+
+ORDERS: Mapping[str, Order] = {
+    order.word: order
+    for order in (
+        Order(STOP, "bring all rigs to rest in order and end the test"),
+        Order(EMERGENCY, "stop all rigs at once, without a ramp; latched until reset"),
+        Order(RESET, "let laboratories leave their latched safe state once its cause is gone"),
+    )
+}
 
 
 class Operated(Protocol):
@@ -29,8 +56,8 @@ class Operated(Protocol):
 
 def obey(loop: Operated, wish: Operator) -> None:
     """Obey a request of this test's operator once per press, and answer each repetition of it."""
-    lab = loop.lab
-    if wish.plan != lab.plan.digest() or wish.word not in WORDS:
+    lab, order = loop.lab, ORDERS.get(wish.word)
+    if wish.plan != lab.plan.digest() or order is None or lab.name not in order.answered_by(lab.plan.roles):
         return
     if lab.safety.pressed(wish.press):
         lab.answers[wish.press] = _done(loop, wish)

@@ -1,4 +1,18 @@
-"""The common part of `rths stop` and `rths reset`: an operator's order, and every laboratory's answer."""
+"""An operator's order to a running test, and the answers to it: the way of `rths stop`, `rths reset` and the like.
+
+The orders are those of `common.lab.operation.ORDERS`. To send one:
+
+1. `chosen` gives the plan of the test and the endpoint of its master, on the machine of `rths run` from the account
+   that the test keeps there;
+2. `line` opens the link to that endpoint as the operator. It may be kept for many orders, and is closed by `close`;
+3. `gathered` sends one order and returns an `Answer` by role, with `accepted` and a sentence in `text`. A role that is
+   missing in the result was not heard.
+
+Every press of a button has a number of its own, `new_press()`. An order is repeated under its number until all roles
+that answer it have done so or `PATIENCE_S` is over. A laboratory carries out a number once and answers every
+repetition of it with the same words, so that `gathered` may be called again with the same `press` where an answer is
+missing: nothing moves twice.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +26,12 @@ from pathlib import Path
 
 from common.errors import LostError
 from common.host import running
+from common.lab.operation import ORDERS
 from common.link.endpoint import Endpoint
 from common.plan.plan import Plan
 from common.plan.read import parse
 from common.protocol.messages import Answer, Operator
-from common.roles import MASTER, OPERATOR, title
+from common.roles import OPERATOR, title
 from common.terminal import cli
 from common.terminal.printable import shown
 
@@ -40,14 +55,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def carry_out(args: argparse.Namespace, word: str) -> int:
-    """Ask all laboratories of a test; 0 where all did it, 1 where one did not.
+    """Give an order to a test; 0 where all roles that answer it did it, 1 where one did not.
 
     Raises:
         LostError: a laboratory gave no answer.
     """
     plan, endpoint = chosen(args)
     answers = asked(plan, endpoint, word, args.reason)
-    silent = [title(role) for role in (MASTER, *plan.roles) if role not in answers]
+    silent = [title(role) for role in ORDERS[word].answered_by(plan.roles) if role not in answers]
     show(answers, as_json=args.json)
     if silent:
         raise LostError(f"No answer came from the {' and the '.join(silent)} within {PATIENCE_S:g} s.")
@@ -64,24 +79,42 @@ def chosen(args: argparse.Namespace) -> tuple[Plan, str]:
 
 
 def asked(plan: Plan, connect: str, word: str, reason: str) -> dict[str, Answer]:
-    """The answers by role; the order is repeated until all have answered or `PATIENCE_S` is over."""
+    """The answers by role to one order, over a link of its own."""
+    endpoint = line(plan, connect)
+    try:
+        return gathered(endpoint, plan, word, reason)
+    finally:
+        endpoint.close()
+
+
+def line(plan: Plan, connect: str) -> Endpoint:
+    """The operator's link to the master that listens at `connect`.
+
+    Raises:
+        LostError: nobody listens there within `PATIENCE_S`.
+    """
     from common.lab.process import join
     from common.link.endpoint import FrameEndpoint
 
     impatient = replace(plan, link=replace(plan.link, connect_timeout=PATIENCE_S))
-    link = join(impatient, OPERATOR, str, cli.text_report, connect=connect)
-    try:
-        return gathered(FrameEndpoint(link, plan.digest()), plan, word, reason)
-    finally:
-        link.close()
+    return FrameEndpoint(join(impatient, OPERATOR, str, cli.text_report, connect=connect), plan.digest())
 
 
-def gathered(endpoint: Endpoint, plan: Plan, word: str, reason: str) -> dict[str, Answer]:
-    """The answers by role to one order, which is repeated until every laboratory has answered."""
-    wish = Operator(0, plan.digest(), word, secrets.randbelow(2**62) + 1, reason)
+def new_press() -> int:
+    """The number of a new press: drawn at random, so that no two operators and no two tests have the same."""
+    return secrets.randbelow(2**62) + 1
+
+
+def gathered(endpoint: Endpoint, plan: Plan, word: str, reason: str, press: int = 0) -> dict[str, Answer]:
+    """The answers by role to one order, which is repeated until all roles that answer it have done so.
+
+    `word` is one of `ORDERS`; `press` is the number of the press, by default a new one.
+    """
+    wish = Operator(0, plan.digest(), word, press or new_press(), reason)
+    due = set(ORDERS[word].answered_by(plan.roles))
     answers: dict[str, Answer] = {}
     deadline, again = time.monotonic() + PATIENCE_S, 0.0
-    while len(answers) < 1 + len(plan.roles) and time.monotonic() < deadline:
+    while not due <= answers.keys() and time.monotonic() < deadline:
         if time.monotonic() >= again:
             again = time.monotonic() + REPEAT_S
             endpoint.send(wish)
