@@ -18,6 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cli.rt_arguments(parser)
     cli.processor_argument(parser)
     cli.accept_argument(parser)
+    cli.await_start_argument(parser)
     parser.add_argument(
         "--listen",
         default=cli.DEFAULT_ENDPOINT,

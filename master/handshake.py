@@ -19,11 +19,15 @@ from master.partner import Partner
 # From the choice of the start to the start: a lost message is repeated twice in that time (REPEAT_NS).
 LEAD_NS = 250_000_000
 
+# s, for which armed laboratories wait for an operator's start: time to clear the room and to look at the rigs, while
+# rigs that somebody has forgotten do not stay armed.
+START_S = 600.0
+
 
 class MasterHandshake:
     """The master's handshake up to the start; `wall_ns` is the wall clock minus the laboratory's clock.
 
-    With a `gate` the link to every slave must pass its check.
+    With a `gate` the link to every slave must pass its check, and the start may wait for an operator.
     """
 
     def __init__(
@@ -43,6 +47,9 @@ class MasterHandshake:
         self._gate = gate
         self._digest, self._said = lab.plan.digest(), said(lab.plan)
         self._asked_ns = -REPEAT_NS
+        self._awaits = gate is not None and gate.await_start
+        self._served = False  # whether the link to every slave has passed its check
+        self._waits_ns = 0  # since when the start waits for an operator, 0 where it does not
         for partner in partners if gate else ():
             partner.pass_gate(lab.plan.preflight.exchanges)
 
@@ -143,8 +150,9 @@ class MasterHandshake:
     def _take_sync(self, partner: Partner, reply: SyncReply, received_ns: int) -> None:
         if not partner.take_sync(reply, received_ns):
             return
-        self._lab.heard_ns = received_ns
-        if self._synchronised and self._link_serves():
+        self._lab.heard_ns = partner.heard_ns = received_ns
+        if self._synchronised and not self._served and self._link_serves():
+            self._served = True
             self._ask_anew(received_ns)
 
     def _link_serves(self) -> bool:
@@ -177,13 +185,56 @@ class MasterHandshake:
                 self._asked_ns = now
                 lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._said))
         else:
-            for partner in self._partners:
-                if partner.due(now):
-                    self._ask(partner, now)
-            if not self._partners:
-                self._schedule(now)
+            self._request(now)
         if not self._partners:  # without slaves there is no answer that would call it
             self._move_on()
+
+    def _request(self, now: int) -> None:
+        """Send the slaves what they have to answer next, and choose the start once it is due."""
+        waits = self._waiting(now)
+        for partner in self._partners:
+            if partner.due(now):
+                self._ask(partner, now)
+        if not self._partners and not waits:
+            self._schedule(now)
+
+    # -- an operator's start ------------------------------------------------------------------------
+
+    def start(self) -> bool:
+        """Begin the test that waits for an operator; whether it did."""
+        waited = self._waits_ns > 0 and self._lab.exchange.state is State.ARMED
+        if waited:
+            self._awaits, self._waits_ns = False, 0
+            self._lab.heard_ns = self._lab.clock.now()
+            self._schedule(self._lab.heard_ns)
+            self._ask_anew(self._lab.heard_ns)
+        return waited
+
+    @property
+    def given_up(self) -> bool:
+        """Whether the start has waited for an operator for too long."""
+        return self._waits_ns > 0 and self._lab.clock.now() - self._waits_ns > START_S * 1e9
+
+    def _waiting(self, now: int) -> bool:
+        """Whether the start waits for an operator; the recorder is kept informed, and silent slaves end the test."""
+        lab = self._lab
+        if not self._awaits or lab.exchange.state is not State.ARMED or not self._synchronised:
+            return False
+        if not self._waits_ns:
+            self._waits_ns = now
+            for partner in self._partners:
+                partner.heard_ns = now
+            text = f"all laboratories are armed; waits for an operator's start, {START_S:g} s at most."
+            lab.report("waiting", {"lab": lab.name, "text": text})
+        if now - self._asked_ns >= REPEAT_NS:
+            self._asked_ns = now
+            lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._said))
+        if not self._partners:
+            lab.heard_ns = now
+        silent = next((one for one in self._partners if now - one.heard_ns > lab.loss_ns), None)
+        if silent is not None:
+            lab.lost(f"The {silent.title}", lab.plan.link.loss_timeout)
+        return True
 
     def _forsaken(self) -> bool:
         """Serve whoever is to move the laboratories; whether that has gone, which ends the test."""
@@ -232,7 +283,7 @@ class MasterHandshake:
         match self._lab.exchange.state:
             case State.REGISTERED if not partner.armed:
                 partner.arm()
-            case State.ARMED if not partner.synchronised:
+            case State.ARMED if not partner.synchronised or self._waits_ns:
                 partner.synchronise(now)
             case State.ARMED if self._synchronised and not partner.scheduled:
                 self._schedule(now)

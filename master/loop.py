@@ -40,7 +40,7 @@ from common.safety.watchdog import WatchdogFinding
 from laboratories import kinds
 from laboratories.longest import resting
 from master.building import BuildingStep, Outputs
-from master.handshake import MasterHandshake
+from master.handshake import START_S, MasterHandshake
 from master.limits import MasterLimits
 from master.own import OwnLaboratory
 from master.partner import Partner
@@ -128,8 +128,18 @@ class MasterLoop(RigLoop):
             lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, said(lab.plan)))
 
     def poll(self) -> None:
-        """Before the first tick: move the handshake on."""
+        """Before the first tick: move the handshake on, and end a test that nobody starts."""
         self._handshake.poll()
+        if self._handshake.given_up:
+            self.end(f"No operator started the armed test within {START_S:g} s.")
+
+    def start(self) -> tuple[bool, str]:
+        """Begin a test that waits for the operator's start; whether it did, and a sentence."""
+        if self.lab.running:
+            return False, "The test runs already."
+        if not self._handshake.start():
+            return False, f"The test does not wait for a start: the laboratory is {self.lab.safety.mode.value}."
+        return True, "The test begins."
 
     # -- ticks ------------------------------------------------------------------------------------
 

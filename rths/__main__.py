@@ -20,6 +20,7 @@ VERBS = {
     "slave": "run laboratory B of a test on several machines",
     "record": "record a test on several machines",
     "live": "show a test while it runs, or its recording, in a browser",
+    "start": "begin a test whose armed laboratories wait for it",
     "stop": "stop a running test, in order or at once",
     "reset": "let laboratories leave their latched safe state",
     "init": "write a plan to begin with, and the skeleton of a rig",
@@ -53,7 +54,7 @@ VERBS = {
 }
 
 FOLDERS = {
-    "rths.perform": ("run", "serve", "live", "stop", "reset"),
+    "rths.perform": ("run", "serve", "live", "start", "stop", "reset"),
     "rths.prepare": (
         "init",
         "check",
@@ -126,6 +127,7 @@ EXAMPLES = {
     "slave": "rths slave default --connect tcp/192.0.2.1:7447",
     "record": "rths record default --connect tcp/192.0.2.1:7447 -o test.mcap",
     "live": "rths live runs/default-20260101-120000.mcap",
+    "start": "rths start --reason ready",
     "stop": "rths stop --emergency",
     "reset": "rths reset --reason inspected",
     "init": "rths init my_test",

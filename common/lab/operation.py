@@ -1,4 +1,4 @@
-"""What a laboratory does at an operator's request: stop in order, stop at once, reset.
+"""What a laboratory does at an operator's request: start, stop in order, stop at once, reset.
 
 `ORDERS` holds every request that there is, with the roles that answer it. `rths.perform.operate` sends one, numbers it
 and collects the answers; its docstring says how.
@@ -14,7 +14,7 @@ from common.lab.laboratory import Laboratory
 from common.protocol.messages import Answer, Operator
 from common.roles import MASTER
 
-STOP, EMERGENCY, RESET = "stop", "emergency", "reset"
+START, STOP, EMERGENCY, RESET = "start", "stop", "emergency", "reset"
 
 
 class Order(NamedTuple):
@@ -32,6 +32,7 @@ class Order(NamedTuple):
 ORDERS: Mapping[str, Order] = {
     order.word: order
     for order in (
+        Order(START, "begin a test whose armed laboratories wait for it", everywhere=False),
         Order(STOP, "bring all rigs to rest in order and end the test"),
         Order(EMERGENCY, "stop all rigs at once, without a ramp; latched until reset"),
         Order(RESET, "let laboratories leave their latched safe state once its cause is gone"),
@@ -43,6 +44,9 @@ class Operated(Protocol):
     """A laboratory's loop as an operator sees it."""
 
     lab: Laboratory
+
+    def start(self) -> tuple[bool, str]:
+        """Begin a test that waits for the operator's start; whether it did, and a sentence; the master's alone."""
 
     def end(self, reason: str) -> None:
         """End the test in order."""
@@ -69,6 +73,8 @@ def obey(loop: Operated, wish: Operator) -> None:
 def _done(loop: Operated, wish: Operator) -> tuple[bool, str]:
     """Do what is requested; return whether it was done, and a sentence."""
     lab, reason = loop.lab, wish.reason or "no reason given"
+    if wish.word == START:
+        return loop.start()
     if wish.word == RESET:
         return _reset(loop)
     if wish.word == EMERGENCY:

@@ -64,12 +64,14 @@ def refusal(risks: Sequence[Risk]) -> RefusedError:
 class Gate:
     """The checks that one laboratory must pass before it moves, and their results.
 
-    `accepted` are the names of the accepted risks. Results are kept until `note` records them, since an event needs a
+    `accepted` are the names of the accepted risks. With `await_start` the armed laboratories wait for an operator's
+    start, which the master's gate alone decides. Results are kept until `note` records them, since an event needs a
     test time, which exists once the start is agreed.
     """
 
-    def __init__(self, accepted: Collection[str] = ()) -> None:
+    def __init__(self, accepted: Collection[str] = (), *, await_start: bool = False) -> None:
         self.accepted = known(accepted)
+        self.await_start = await_start
         self.overruled: list[Risk] = []
         self.passed: list[tuple[str, str, str]] = []  # code of the event, its text and its level
 

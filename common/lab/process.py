@@ -61,7 +61,7 @@ def conduct(
     for given in (listen, connect):
         checked(given)
     stopping = Stopper()
-    gate = Gate(cli.accepted_risks(args))
+    gate = Gate(cli.accepted_risks(args), await_start=getattr(args, "await_start", False))
     plan = cli.load_plan(args)
     report = cli.reporter(args.json, plan.test.duration)
     reality = cli.load_reality(args.reality, plan)

@@ -113,6 +113,10 @@ class RigLoop:
                 text = f"{self._rig.name}: {account.sentence()}."
                 self.lab.note(preflight.RIG, text, tick=self.ticks, values=values)
 
+    def start(self) -> tuple[bool, str]:
+        """Refuse the operator's start, which the master alone carries out."""
+        return False, "The master starts the test."
+
     def end(self, reason: str) -> None:
         """Bring the test to an end in order: after its last tick, or earlier because somebody wants it so."""
         lab = self.lab

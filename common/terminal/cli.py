@@ -175,6 +175,13 @@ def accept_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def await_start_argument(parser: argparse.ArgumentParser) -> None:
+    """The option by which armed laboratories wait for an operator's start."""
+    parser.add_argument(
+        "--await-start", action="store_true", help="arm the rigs and wait for `rths start` before they move"
+    )
+
+
 def accepted_risks(args: argparse.Namespace) -> tuple[str, ...]:
     """The names of the risks that the command line accepts; raises InputError for an unknown name."""
     return risks.known(args.accept_risk)

@@ -44,6 +44,7 @@ def test_arguments(parser: argparse.ArgumentParser) -> None:
     cli.reality_argument(parser)
     cli.rt_arguments(parser)
     cli.accept_argument(parser)
+    cli.await_start_argument(parser)
     clock = parser.add_mutually_exclusive_group()
     clock.add_argument(
         "--real-time", action="store_true", help="a process for each role, on the wall clock (default)"
@@ -90,6 +91,8 @@ def carry_out(args: argparse.Namespace, plan: Plan, virtually: VirtualTime) -> i
         raise InputError(
             "--live shows a test in real time: leave out --virtual, or give its recording to rths live."
         )
+    if args.await_start and args.virtual:
+        raise InputError("--await-start is for a test in real time: in virtual time there is no operator.")
     reality = cli.load_reality(args.reality, plan)
     stopping = Stopper()
     with reserved(args.output, plan, force=args.force) as output:
@@ -263,9 +266,10 @@ def start_all(
         words += ["--accept-risk", name]
     served = [word for address in addresses(args) for word in ("--opensees", address)]
     words += ["--intervals", str(args.intervals)] if served else []
+    awaiting = ["--await-start"] if args.await_start else []
     secret = ["--reality", str(args.reality)] if args.reality else []
     places = [real_time_words(args.rt, processor) for processor in assign(1 + len(roles))]
-    processes.start("master", [*words, *secret, *places[0], *served, "--listen", endpoint])
+    processes.start("master", [*words, *secret, *places[0], *served, *awaiting, "--listen", endpoint])
     for role, place in zip(roles, places[1:], strict=True):
         processes.start(role, [*words, *secret, *place, "--connect", endpoint])
     # --force: this command has reserved the file, which is empty or may be replaced
