@@ -191,11 +191,12 @@ class MasterHandshake:
 
     def _request(self, now: int) -> None:
         """Send the slaves what they have to answer next, and choose the start once it is due."""
-        waits = self._waiting(now)
+        if self._awaits and self._lab.exchange.state is State.ARMED and self._synchronised:
+            self._wait(now)
         for partner in self._partners:
             if partner.due(now):
                 self._ask(partner, now)
-        if not self._partners and not waits:
+        if not self._partners and not self._awaits:
             self._schedule(now)
 
     # -- an operator's start ------------------------------------------------------------------------
@@ -215,17 +216,16 @@ class MasterHandshake:
         """Whether the start has waited for an operator for too long."""
         return self._waits_ns > 0 and self._lab.clock.now() - self._waits_ns > START_S * 1e9
 
-    def _waiting(self, now: int) -> bool:
-        """Whether the start waits for an operator; the recorder is kept informed, and silent slaves end the test."""
+    def _wait(self, now: int) -> None:
+        """Keep the recorder informed while the start waits for an operator; a slave that falls silent ends the test."""
         lab = self._lab
-        if not self._awaits or lab.exchange.state is not State.ARMED or not self._synchronised:
-            return False
         if not self._waits_ns:
             self._waits_ns = now
             for partner in self._partners:
                 partner.heard_ns = now
-            text = f"all laboratories are armed; waits for an operator's start, {START_S:g} s at most."
-            lab.report("waiting", {"lab": lab.name, "text": text})
+            text = f"All laboratories are armed: waits for an operator's start, {START_S:g} s at most."
+            told = {"t": 0.0, "lab": lab.name, "level": "info", "code": "await_start", "text": text}
+            lab.report("event", told)  # which is not recorded: there is no test time yet
         if now - self._asked_ns >= REPEAT_NS:
             self._asked_ns = now
             lab.endpoint.send(Register(lab.exchange.session, PROTOCOL_VERSION, self._said))
@@ -234,7 +234,6 @@ class MasterHandshake:
         silent = next((one for one in self._partners if now - one.heard_ns > lab.loss_ns), None)
         if silent is not None:
             lab.lost(f"The {silent.title}", lab.plan.link.loss_timeout)
-        return True
 
     def _forsaken(self) -> bool:
         """Serve whoever is to move the laboratories; whether that has gone, which ends the test."""

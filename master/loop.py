@@ -138,7 +138,10 @@ class MasterLoop(RigLoop):
         if self.lab.running:
             return False, "The test runs already."
         if not self._handshake.start():
-            return False, f"The test does not wait for a start: the laboratory is {self.lab.safety.mode.value}."
+            return (
+                False,
+                f"The test does not wait for a start: the laboratory is {self.lab.safety.mode.value}.",
+            )
         return True, "The test begins."
 
     # -- ticks ------------------------------------------------------------------------------------

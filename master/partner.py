@@ -133,7 +133,9 @@ class Partner:
             return False
         self._offset.add(self._sync_sent_ns, reply.received_ns, reply.sent_ns, received_ns)
         self._syncs += 1
-        if self._syncs <= self._exchanges:  # later ones, ten a second, are made while the start waits for an operator
+        if (
+            self._syncs <= self._exchanges
+        ):  # later ones, ten a second, are made while the start waits for an operator
             self.trips.append((received_ns - self._sync_sent_ns) * 1e-9)
             self.ask_anew(received_ns)
         return True
