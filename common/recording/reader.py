@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
+from functools import partial
 from math import inf
 from pathlib import Path
 from types import TracebackType
@@ -89,7 +90,7 @@ class Tail:
 
     def __init__(self, path: Path, *, messages: bool = True) -> None:
         self.path = path
-        self._unpacked = unpacked if messages else definitions
+        self._unpacked = partial(unpacked, messages=messages)
         self.place = 0
         self.finished = self.behind = False
         self.damage = self.cause = ""
@@ -182,10 +183,10 @@ class Tail:
             self.finished = opcode == Opcode.FOOTER
 
 
-def unpacked(record: McapRecord, bounds: Bounds) -> Iterator[McapRecord]:
-    """The records of a chunk, or the record itself.
+def unpacked(record: McapRecord, bounds: Bounds, *, messages: bool = True) -> Iterator[McapRecord]:
+    """The records of a chunk, or the record itself; without `messages`, the definitions before the first message.
 
-    Definitions and messages are read from chunks alone, which have a checksum.
+    Definitions and messages are read from chunks alone, which have a checksum; it is checked for the whole chunk.
 
     Raises:
         ValueError: a chunk is damaged.
@@ -197,27 +198,11 @@ def unpacked(record: McapRecord, bounds: Bounds) -> Iterator[McapRecord]:
     data = content(record)
     bounds.unpack(len(data))
     for opcode, found in inner(data):
+        if opcode == Opcode.MESSAGE and not messages:
+            return
         bounds.record()
         if opcode == Opcode.MESSAGE:
             channel, sequence, log_ns, publish_ns = MESSAGE.unpack_from(found, HEAD.size)
             yield Message(channel, log_ns, found[HEAD.size + MESSAGE.size :], publish_ns, sequence)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            yield parsed(found)
-
-
-def definitions(record: McapRecord, bounds: Bounds) -> Iterator[McapRecord]:
-    """The definitions before the first message of a chunk, whose content is checked whole, or the record itself.
-
-    Raises:
-        ValueError, InputError: as `unpacked`.
-    """
-    if not isinstance(record, Chunk):
-        yield record
-        return
-    data = content(record)
-    bounds.unpack(len(data))
-    for opcode, found in inner(data):
-        if opcode == Opcode.MESSAGE:
-            return
-        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             yield parsed(found)

@@ -7,67 +7,35 @@ import json
 import random
 import sys
 import tracemalloc
-from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from mcap.reader import make_reader
-from mcap.records import Chunk, Message
-from mcap.stream_reader import StreamReader, breakup_chunk
 
 from common.errors import InputError, RthsError
 from common.recording.reader import read
 from common.recording.records import HEAD
 from common.recording.recover.recovery import recover
 from common.recording.writer import REPEAT_BYTES, Recording
-from common.signals import TICK_TOPICS, TOPICS, FieldType
+from common.signals import TICK_TOPICS, TOPICS
 from rths.examine.recover import write_account
-
-TICKS = 600
-RAMPS = ("master_ramp", "slave_ramp")
-PER_FLUSH = 25
-Key = tuple[int, int, int, int, bytes]
-Spot = tuple[str, int, int, Any]  # kind of a record, its place, its end, the record
-
-TIMES = slice(HEAD.size, HEAD.size + 16)  # of a chunk's first and last message, which no checksum covers
-DEFAULTS: dict[FieldType, Any] = {
-    FieldType.FLAG: False,
-    FieldType.INDEX: 3,
-    FieldType.STAMP: 2**44,
-    FieldType.TEXT: "ramping",
-}
-
-
-def values(topic: str, seq: int, noise: random.Random) -> list[Any]:
-    """A message; with a generator of its own a file is the same whichever tests run before."""
-    return [seq, *(DEFAULTS.get(row.kind, noise.random()) for row in TOPICS[topic][1:])]
-
-
-def garbage(size: int) -> bytes:
-    return random.Random(1).randbytes(size)
-
-
-def write(path: Path, ticks: int = TICKS, *, close: bool = True, skip: range = range(0)) -> None:
-    recording, noise = Recording(path, "trial", 1, TOPICS), random.Random(1)
-    recording.metadata("plan", {"toml": "x = 1"})
-    recording.attach("ground_motion", bytes(range(256)) * 8, "application/octet-stream")
-    recording.add("event", 0, 0, (0.0, "recorder", "info", "begin", "begun", {}))
-    recording.flush()
-    for seq in range(ticks):
-        for topic in TICK_TOPICS:
-            if seq not in skip:
-                recording.add(topic, seq * 2_000_000, seq * 2_000_000 + 5, values(topic, seq, noise))
-        if seq % PER_FLUSH == PER_FLUSH - 1:
-            recording.flush()
-    if close:
-        recording.close({"outcome": "completed"})
-    else:
-        recording.flush()
-        recording.abandon()
+from tests.common.damaged import (
+    PER_FLUSH,
+    TICKS,
+    TIMES,
+    Key,
+    chunks_of,
+    damaged,
+    garbage,
+    keys,
+    read_by_the_library,
+    spots,
+    values,
+    whole_in,
+    write,
+)
 
 
 @pytest.fixture(scope="module")
@@ -82,67 +50,6 @@ def unfinished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("unfinished") / "a.mcap"
     write(path, close=False)
     return path
-
-
-def spots(path: Path) -> list[Spot]:
-    """Every record outside chunks, with its place."""
-    found: list[Spot] = []
-    with path.open("rb") as stream:
-        records = StreamReader(stream, emit_chunks=True).records
-        begin = 8
-        while True:
-            try:
-                record = next(records)
-            except Exception:
-                return found
-            found.append((type(record).__name__, begin, stream.tell(), record))
-            begin = stream.tell()
-
-
-@cache
-def chunks_of(path: Path) -> list[tuple[bytes, set[Key]]]:
-    """Bytes of every chunk of an undamaged file, and its messages."""
-    data = path.read_bytes()
-    return [(data[spot[1] : spot[2]], set(keys(spot[3]))) for spot in spots(path) if spot[0] == "Chunk"]
-
-
-def whole_in(data: bytes, chunk: bytes) -> bool:
-    """Whether a chunk is there as it was written, whatever its times are."""
-    place = data.find(chunk[TIMES.stop :]) - TIMES.stop
-    return place >= 0 and data[place : place + TIMES.start] == chunk[: TIMES.start]
-
-
-def keys(chunk: Chunk) -> list[Key]:
-    return [key(record) for record in breakup_chunk(chunk) if isinstance(record, Message)]
-
-
-def key(message: Message) -> Key:
-    return (
-        message.channel_id,
-        message.sequence,
-        message.log_time,
-        message.publish_time,
-        message.data,
-    )
-
-
-def read_by_the_library(path: Path) -> list[Key]:
-    with path.open("rb") as stream:
-        reader = make_reader(stream, validate_crcs=True)
-        summary = reader.get_summary()
-        assert summary is not None
-        assert summary.statistics is not None
-        found = [key(message) for _, _, message in reader.iter_messages(log_time_order=False)]
-        assert summary.statistics.message_count == len(found)
-        return found
-
-
-def damaged(path: Path, tmp_path: Path, change: Callable[[bytearray], Any]) -> tuple[Path, Path]:
-    data = bytearray(path.read_bytes())
-    change(data)
-    broken = tmp_path / "broken.mcap"
-    broken.write_bytes(data)
-    return broken, tmp_path / "out.mcap"
 
 
 def test_a_whole_recording_is_the_same_after_recovery(whole: Path, tmp_path: Path) -> None:
@@ -318,73 +225,6 @@ def test_damaged_metadata_and_attachments_are_named_and_nobody_uses_them(
     assert run.ticks("master") == TICKS
     write_account(found, sys.stdout)
     assert "lost: metadata 'plan' (damaged)\n" in capsys.readouterr().out
-
-
-RAMP = 100  # ticks, behind those of the test
-
-
-@pytest.fixture(scope="module")
-def with_ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Ticks and the ramps to rest behind them, a chunk for every 25."""
-    path = tmp_path_factory.mktemp("ramp") / "a.mcap"
-    recording, noise = Recording(path, "trial", 1, TOPICS), random.Random(1)
-    for seq in range(TICKS + RAMP):
-        for topic in TICK_TOPICS if seq < TICKS else RAMPS:
-            recording.add(topic, seq * 2_000_000, seq * 2_000_000 + 5, values(topic, seq, noise))
-        if seq % PER_FLUSH == PER_FLUSH - 1:
-            recording.flush()
-    recording.close({"outcome": "completed"})
-    return path
-
-
-def without(path: Path, folder: Path, places: slice, *, torn: bool = False) -> Any:
-    """The account of a file of whose chunks some are overwritten, and whose summary is cut off where it is torn."""
-    chunks = [spot for spot in spots(path) if spot[0] == "Chunk"][places]
-
-    def change(data: bytearray) -> None:
-        for _, begin, end, _ in chunks:
-            data[begin:end] = bytes(end - begin)
-        if torn:
-            del data[-30:]
-
-    return recover(*damaged(path, folder, change))
-
-
-@pytest.mark.parametrize("torn", [False, True])
-def test_a_hole_among_the_ticks_takes_nothing_from_the_ways_to_rest(
-    with_ramp: Path, tmp_path: Path, torn: bool
-) -> None:
-    found = without(with_ramp, tmp_path, slice(3, 5), torn=torn)
-    assert [hole[:2] for hole in found.topics["master"].missing] == [(75, 124)]
-    for topic in RAMPS:
-        assert (found.topics[topic].kept, found.topics[topic].missing) == (RAMP, [])
-
-
-@pytest.mark.parametrize(
-    ("chunks", "lost"),
-    [
-        ((24, 25), (600, 624)),  # the first quarter of the ramp to rest
-        ((25, 26), (625, 649)),
-        ((26, 28), (650, 699)),
-        ((24, 28), (600, 699)),
-    ],
-)
-def test_what_is_lost_of_a_way_to_rest_is_counted_behind_the_ticks(
-    with_ramp: Path, tmp_path: Path, chunks: tuple[int, int], lost: tuple[int, int]
-) -> None:
-    found = without(with_ramp, tmp_path, slice(*chunks))
-    assert found.topics["master"].missing == []
-    for topic in RAMPS:
-        assert [hole[:2] for hole in found.topics[topic].missing] == [lost]
-        assert found.topics[topic].kept == RAMP - (lost[1] + 1 - lost[0])
-
-
-def test_a_hole_over_the_end_of_the_ticks_is_shared_with_the_way_to_rest(
-    with_ramp: Path, tmp_path: Path
-) -> None:
-    found = without(with_ramp, tmp_path, slice(23, 25))
-    assert [hole[:2] for hole in found.topics["slave"].missing] == [(575, 599)]
-    assert [hole[:2] for hole in found.topics["slave_ramp"].missing] == [(600, 624)]
 
 
 def test_lost_metadata_are_named(whole: Path, tmp_path: Path) -> None:

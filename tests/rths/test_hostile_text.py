@@ -23,7 +23,7 @@ from report.text.terminal import RunProgress, table
 from rths.__main__ import VERBS
 from rths.perform.follow import tell
 from rths.perform.processes import TEXT, Said
-from tests.rths.diagnosis_report.reports import bare
+from tests.rths.diagnosis_report.pieces import bare
 
 READABLE = "µ²λ–Ωé"
 HOSTILE = (

@@ -73,13 +73,13 @@ def pushes(plan: Plan, places: Any, forces: Any, columns: dict[str, Any]) -> Non
     assert of["damper_force"] == pytest.approx(alone[:, TABLE.channels.names.index("damper_force")], abs=1e-9)
     # the force used at the displacement of step i was measured an interval before; OpenSees' elements resist
     assert np.array_equal(forces, -plan.damper.force_scale * of["damper_force"][:STEPS])
-    assert np.max(np.abs(forces)) > 100.0
 
 
 def test_a_table_with_its_motor_stands_behind_an_element(tmp_path: Path) -> None:
     plan = parse(QUIET + '[master]\nkind = "none"\n', tmp_path)
     places, forces, columns = swayed(tmp_path, plan)
     pushes(plan, places, forces[:, 0], columns)
+    assert np.max(np.abs(forces)) > 100.0
 
 
 def test_a_column_and_a_table_stand_behind_one_element(tmp_path: Path) -> None:
@@ -87,6 +87,7 @@ def test_a_column_and_a_table_stand_behind_one_element(tmp_path: Path) -> None:
     places, forces, columns = swayed(tmp_path, plan, 2)
     assert forces[:, 0] == pytest.approx(6.25e6 * places, rel=1e-12)
     pushes(plan, places, forces[:, 1], columns)
+    assert np.max(np.abs(forces[:, 1])) > 100.0
 
 
 def test_a_rig_of_the_users_own_stands_behind_an_element(tmp_path: Path) -> None:

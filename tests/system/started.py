@@ -36,7 +36,7 @@ def end_started() -> list[str]:
 
     A pipe that stays open would fail another test, in which it is collected.
     """
-    left = [" ".join(process.args) for process in STARTED if process.poll() is None]
+    left = [str(process.args) for process in STARTED if process.poll() is None]
     for process in STARTED:
         process.kill()
         with process:  # which closes the pipes

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
-from queue import Empty, Queue
 from threading import Event
-from typing import Any
 
 import pytest
 import zenoh
@@ -21,15 +18,15 @@ from mcap.reader import make_reader
 
 from common.errors import InputError, LostError
 from common.link.security import Identity
-from common.link.transport import CHANNELS, CONTROL, SAMPLES, TICK, Packet, Route
-from common.link.zenoh_link import ZenohLink, key, listenable
+from common.link.transport import CHANNELS, CONTROL, SAMPLES, TICK, Route
+from common.link.zenoh_link import key, listenable
 from rths.prepare import keys
 from tests.certificates import DAY, NOW, again, identity, made
 from tests.faults.rows import passed
 from tests.helpers import PATIENT, ROOT
+from tests.processes import HANG_S
+from tests.system.certified import TEST, Ear, acquaint, bare, ears
 
-TEST = "secure"
-WAIT_S = 10.0
 SHORT_S = 0.3  # for what must not come
 name = partial(key, TEST)
 
@@ -44,86 +41,6 @@ def authority(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str,
 @pytest.fixture(scope="module")
 def folder(authority: tuple[Path, dict[str, keys.Owner]]) -> Path:
     return authority[0]
-
-
-class Ear:
-    """One role's link, and what it has heard."""
-
-    def __init__(self, role: str, who: Identity | None, **words: Any) -> None:
-        self.packets: Queue[Packet] = Queue()
-        self.link = ZenohLink(role, TEST, identity=who, patience=words.pop("patience", WAIT_S), **words)
-        self.link.listen(self.packets.put)
-
-    def next(self, seconds: float = WAIT_S) -> tuple[str, str, bytes] | None:
-        try:
-            packet = self.packets.get(timeout=seconds)
-        except Empty:
-            return None
-        return packet.role, packet.channel, packet.frame
-
-    def until(self, frame: bytes) -> list[bytes]:
-        """What comes before a frame."""
-        found: list[bytes] = []
-        while (heard := self.next()) is not None:
-            if heard[2] == frame:
-                return found
-            found.append(heard[2])
-        raise TimeoutError(f"{frame!r} never came")
-
-
-@contextmanager
-def ears(folder: Path, *roles: str) -> Iterator[dict[str, Ear]]:
-    """A master and others on a link with certificates, who know of each other's subscriptions."""
-    endpoint = listenable()
-    with ExitStack() as stack:
-        found: dict[str, Ear] = {}
-        for role in ("master", *roles):
-            place = {"listen": endpoint} if role == "master" else {"connect": endpoint}
-            found[role] = Ear(role, identity(folder, role), **place)
-            stack.callback(found[role].link.close)
-        found["master"].endpoint = endpoint  # type: ignore[attr-defined]
-        acquaint(found)
-        yield found
-
-
-def acquaint(found: dict[str, Ear]) -> None:
-    """Send until everybody is heard: subscriptions take their time."""
-    for speaker, hearer in (("master", "slave"), ("slave", "master"), ("recorder", "slave")):
-        if speaker in found and hearer in found:
-            channel = CONTROL if speaker == "recorder" else TICK
-            for _ in range(200):
-                found[speaker].link.send(channel, b"hello")
-                if found[hearer].next(0.05) is not None:
-                    break
-    for ear in found.values():
-        while ear.next(0.1) is not None:
-            pass
-
-
-@contextmanager
-def bare(endpoint: str, who: Identity | None, mode: str = "client") -> Iterator[zenoh.Session]:
-    """A session that asks none of our code, over TLS."""
-    config = zenoh.Config()
-    settings: dict[str, object] = {
-        "mode": mode,
-        "connect/endpoints": [endpoint.replace("tcp/", "tls/")],
-        "connect/timeout_ms": 1000,
-        "connect/exit_on_failure": True,
-        "listen/endpoints": [],
-        "scouting/multicast/enabled": False,
-    }
-    if who is not None:
-        settings |= who.settings()
-    for path, value in settings.items():
-        config.insert_json5(path, json.dumps(value))
-    session = zenoh.open(config)
-    try:
-        yield session
-    finally:
-        session.close()  # type: ignore[no-untyped-call]
-
-
-# -- those who have the right certificate ------------------------------------------------------------
 
 
 def test_the_roles_of_a_test_hear_each_other_as_on_an_open_link(folder: Path) -> None:
@@ -337,7 +254,7 @@ def test_a_visitor_with_a_certificate_of_no_role_is_noticed_and_gets_nothing_thr
         with bare(endpoint, identity(folder, "visitor")) as session:
             for role in ("master", "operator", "visitor"):
                 session.put(name(Route(role, CONTROL)), b"forged")
-            assert noticed.wait(WAIT_S)
+            assert noticed.wait(HANG_S)
             assert found["slave"].next(SHORT_S) is None
     assert told == [
         "'visitor' has joined with a certificate of no role in this test: its messages are blocked."

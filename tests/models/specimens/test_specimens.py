@@ -16,6 +16,17 @@ from models.specimens import SPECIMENS, STATE_SIZE, bouc_wen, pinched
 
 K, DY = 12.5e6, 0.008  # N/m, m
 
+PINCHED = {
+    "stiffness": K,
+    "yield_displacement": DY,
+    "hardening": 0.05,
+    "first_bend": 0.5,
+    "second_stiffness": 0.4,
+    "pinch_force": 0.3,
+    "pinch_displacement": 0.6,
+    "unloading": 0.3,
+    "damage": 0.02,
+}
 EXAMPLES: dict[str, dict[str, float]] = {
     "linear": {"stiffness": K},
     "bilinear": {"stiffness": K, "yield_displacement": DY, "hardening": 0.1},
@@ -30,39 +41,9 @@ EXAMPLES: dict[str, dict[str, float]] = {
     },
     "bwbn": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05},
     "menegotto_pinto": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05, "sharpness": 18.0},
-    "pinched": {
-        "stiffness": K,
-        "yield_displacement": DY,
-        "hardening": 0.05,
-        "first_bend": 0.5,
-        "second_stiffness": 0.4,
-        "pinch_force": 0.3,
-        "pinch_displacement": 0.6,
-        "unloading": 0.3,
-        "damage": 0.02,
-    },
-    "pinched_by_peak": {
-        "stiffness": K,
-        "yield_displacement": DY,
-        "hardening": 0.05,
-        "first_bend": 0.5,
-        "second_stiffness": 0.4,
-        "pinch_force": 0.3,
-        "pinch_displacement": 0.4,
-        "unloading": 0.3,
-        "damage": 0.02,
-    },
-    "pinched_by_rest": {
-        "stiffness": K,
-        "yield_displacement": DY,
-        "hardening": 0.05,
-        "first_bend": 0.5,
-        "second_stiffness": 0.4,
-        "pinch_force": 0.3,
-        "pinch_displacement": 0.6,
-        "unloading": 0.3,
-        "damage": 0.02,
-    },
+    "pinched": PINCHED,
+    "pinched_by_peak": PINCHED | {"pinch_displacement": 0.4},
+    "pinched_by_rest": PINCHED,
     "trilinear": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05},
     "self_centring": {"stiffness": K, "yield_displacement": DY, "hardening": 0.1, "loop": 0.6},
 }

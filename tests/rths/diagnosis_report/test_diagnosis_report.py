@@ -16,24 +16,12 @@ from diagnosis.report.fields import Entry, shapes
 from diagnosis.report.read import report as read
 from diagnosis.report.records import Candidate, Tolerance
 from diagnosis.report.schema import schema
-from laboratories.effects import CATALOGUE
 from report.gap import pictures, which, wording
 from report.gap.page import page
 from report.gap.terminal import summary
 from report.pictures import figure
-from report.text.formats import (
-    axis_unit,
-    nats,
-    percent,
-    percent_interval,
-    probability,
-    quantity,
-    reading,
-    signed,
-    span,
-    times,
-)
-from tests.rths.diagnosis_report.reports import REPORTS, Report, bare, fresh
+from tests.rths.diagnosis_report.pieces import Report, bare
+from tests.rths.diagnosis_report.reports import REPORTS, fresh
 from tests.rths.pictures.axes import check_axes
 from tests.rths.report.pages import Balanced, check_alone
 
@@ -267,56 +255,6 @@ def test_a_report_in_which_nothing_was_determined_has_a_page() -> None:
     assert "not determined" in summary(report)
 
 
-def test_quantities_read_as_in_the_field() -> None:
-    assert quantity(0.0012, "m") == "1.20 mm"
-    assert quantity(5.3e-6, "m") == "5.30 µm"
-    assert quantity(18.75e6, "N/m") == "18.8 MN/m"
-    assert quantity(1400.0, "N", [1350.0, 1450.0]) == "1.40 kN (1.35 … 1.45)"
-    assert quantity(0.044, "s") == "44.0 ms"
-    assert quantity(1.011, "–", [1.009, 1.013]) == "1.0110 (1.0090 … 1.0130)"
-    assert quantity(4.7e-9, "m/N") == "4.70 nm/N"
-    assert quantity(0.0, "s") == "0 s"
-    assert quantity(3.0, "kg", [2.0, None]) == "3.00 kg (from 2.00)"
-    assert quantity(None, "m") == "–"
-    assert [percent(value) for value in (0.91, 0.034, 0.0012, 0.0, None)] == [
-        "91 %",
-        "3.4 %",
-        "0.12 %",
-        "0 %",
-        "–",
-    ]
-    assert [probability(value) for value in (0.999, 0.5, 0.001, None)] == ["> 99 %", "50 %", "< 1 %", "–"]
-    assert percent_interval([0.86, 0.95]) == "86 … 95 %"
-    assert percent_interval([None, 0.95]) == ""
-    assert [times(14.2), times(1.6), times(None)] == ["14×", "1.6×", "–"]
-    assert span([2.1, 9.8], "s") == "2.1–9.8 s"
-
-
-def candidate(*names: str) -> dict[str, Any]:
-    values = {
-        name: {
-            one.name: {"value": 1.0, "interval": None, "unit": one.unit} for one in CATALOGUE[name].parameters
-        }
-        for name in names
-    }
-    return {"effects": list(names), "parameters": values, "probability": 0.5, "held_out_score": 0.0}
-
-
-@pytest.mark.parametrize("others", [(), ("damper.friction",)])
-def test_no_word_of_an_effect_is_said_twice(others: tuple[str, ...]) -> None:
-    explained = fresh("explained")
-    for name in CATALOGUE:
-        report = read(explained | {"which": [candidate(name, *others)]})
-        lines = summary(report).splitlines()
-        first = next(place for place, line in enumerate(lines) if line.startswith("which"))
-        last = next(place for place, line in enumerate(lines) if place > first and not line.startswith(" "))
-        said = " ".join(" ".join(lines[first:last]).split())
-        assert not re.search(r"\b([a-z]{2,})\W+\1\b", said), said
-        assert all(wording.effect(each) in said for each in (name, *others))
-        for setting, _value in which.parameters(report.which[0]).rows:
-            assert not re.search(r"\b([a-z]{2,})\W+\1\b", setting), setting
-
-
 def test_names_become_words() -> None:
     assert wording.effect("sensor.column_force.gain") == "gain of the column force sensor"
     assert wording.effect("damper.stroke_stop") == "damper stroke stop"
@@ -367,31 +305,6 @@ def test_no_label_of_a_picture_is_cut_off_and_no_factor_stands_above_an_axis(mon
         canvas.draw_without_rendering()
         check_axes(canvas, str([axis.get_ylabel() for axis in canvas.axes]))
     assert "µm" in str([axis.get_ylabel() for axis in canvases[1].axes])
-
-
-def test_numbers_that_say_nothing_are_not_written_out() -> None:
-    assert quantity(-1e-15, "s") == "0 s"
-    assert quantity(3.0, "N", [None, None]) == "3.00 N"
-    assert quantity(3.0, "N", [None, 4.0]) == "3.00 N (up to 4.00)"
-    assert times(0.004) == "< 0.1×"
-    assert span([0.0, 0.0], "Hz") == ""
-    assert nats(134000.0) == "more than 1,000 nats"
-    assert reading(-1e-9, "m") == "0.000 mm"
-    assert [signed(value, 2) for value in (-0.001, 0.001, -0.02, 0.02)] == ["0.00", "0.00", "−0.02", "+0.02"]
-    assert axis_unit("column displacement (m)", 2e-3) == (1e3, "column displacement (mm)")
-
-
-def test_no_more_than_the_whole_gap_is_said_to_close() -> None:
-    report = fresh("explained")
-    report["how_far"] |= {"closed": 1.01, "closed_interval": [0.93, 1.09]}
-    found = read(report)
-    assert wording.closed(found) == "100 % (93 … 100 %)"
-    assert "closes 100 % of it" in wording.cause(found)
-    clean = fresh("no_gap")
-    clean["how_far"] |= {"closed": 0.0, "closed_interval": [0.0, 0.0]}
-    assert "closed" not in next(
-        line for line in summary(read(clean)).split("\n") if line.startswith("how far")
-    )
 
 
 @pytest.mark.usefixtures("undrawn")

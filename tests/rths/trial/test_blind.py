@@ -29,7 +29,7 @@ from diagnosis.report.records import Report
 from laboratories.effects import CATALOGUE
 from rths.examine.diagnose import write_found
 from rths.prove import blind
-from tests.rths.diagnosis_report.reports import bare
+from tests.rths.diagnosis_report.pieces import bare
 from validation.blind import library as libraries
 from validation.blind.cases.basis import basis
 from validation.blind.cases.case import Case

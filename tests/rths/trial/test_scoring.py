@@ -11,7 +11,7 @@ import pytest
 
 from common.roles import MASTER, SLAVE
 from diagnosis.report import read
-from tests.rths.diagnosis_report.reports import bare
+from tests.rths.diagnosis_report.pieces import bare
 from tests.rths.report.pages import check_alone, check_in_browser
 from validation.blind.cases.case import Case, Laid
 from validation.blind.judge import DiagnosisAnswer

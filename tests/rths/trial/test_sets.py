@@ -16,7 +16,7 @@ from common.plan import read as plans
 from common.reality import reality as realities
 from diagnosis.report import read as read_report
 from tests import opensees
-from tests.rths.diagnosis_report.reports import bare
+from tests.rths.diagnosis_report.pieces import bare
 from tests.rths.trial.test_scoring import CABLE, RUB, SOFT, case, judged, said
 from validation.blind import oracle
 from validation.blind.best import best_closed

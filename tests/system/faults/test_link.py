@@ -13,21 +13,9 @@ from common.link.zenoh_link import LEASE_MS
 from common.protocol.codec import KINDS
 from common.protocol.messages import Stop
 from tests.faults.rows import passed
-from tests.system.faults.bench import (
-    INTERVAL,
-    LABS,
-    Bench,
-    Place,
-    Process,
-    Reaction,
-    evidence,
-    exchanged,
-    judge,
-    loopback,
-    undisturbed,
-    worst,
-)
+from tests.system.faults.bench import INTERVAL, LABS, Bench, Place, Process, loopback, undisturbed
 from tests.system.faults.network import ADDRESSES, Network, inside, network
+from tests.system.faults.reactions import Reaction, evidence, exchanged, judge, worst
 from tests.system.faults.relay import TO_SLAVE, Relay, untouched
 
 pytestmark = pytest.mark.faults

@@ -19,20 +19,8 @@ from common.protocol.messages import Answer, Operator
 from common.roles import OPERATOR
 from common.terminal.cli import text_report
 from tests.faults.rows import motion_bound, passed
-from tests.system.faults.bench import (
-    INTERVAL,
-    LABS,
-    PAUSE,
-    WATCHDOG,
-    Bench,
-    DisturbedError,
-    evidence,
-    first_error,
-    judge,
-    modes_of,
-    undisturbed,
-    worst,
-)
+from tests.system.faults.bench import INTERVAL, LABS, PAUSE, WATCHDOG, Bench, DisturbedError, undisturbed
+from tests.system.faults.reactions import evidence, first_error, judge, modes_of, worst
 from tests.system.faults.rigs import Wish
 
 pytestmark = pytest.mark.faults

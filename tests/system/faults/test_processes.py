@@ -10,16 +10,8 @@ from pathlib import Path
 import pytest
 
 from tests.faults.rows import passed
-from tests.system.faults.bench import (
-    INTERVAL,
-    WATCHDOG,
-    Bench,
-    evidence,
-    exchanged,
-    judge,
-    undisturbed,
-    worst,
-)
+from tests.system.faults.bench import INTERVAL, WATCHDOG, Bench, undisturbed
+from tests.system.faults.reactions import evidence, exchanged, judge, worst
 
 pytestmark = pytest.mark.faults
 

@@ -9,9 +9,10 @@ import pytest
 
 from common.recording.run import Run
 from tests.faults.rows import passed
-from tests.system.faults.bench import AT, INTERVAL, LABS, Bench, DisturbedError, Process, later, undisturbed
+from tests.system.faults.bench import AT, INTERVAL, LABS, Bench, DisturbedError, Process, undisturbed
 from tests.system.faults.hostile import Stranger
 from tests.system.faults.impostor import FAR
+from tests.system.faults.reactions import later
 
 pytestmark = pytest.mark.faults
 

@@ -24,15 +24,9 @@ from common.lab.outlet import kept_seconds
 from common.recording.run import Run
 from tests.faults.rows import passed
 from tests.helpers import JUMPS
-from tests.system.faults.bench import (
-    INTERVAL,
-    Bench,
-    Place,
-    exchanged,
-    later,
-    undisturbed,
-)
+from tests.system.faults.bench import INTERVAL, Bench, Place, undisturbed
 from tests.system.faults.network import PORT, Network, inside, network
+from tests.system.faults.reactions import exchanged, later
 
 pytestmark = pytest.mark.soak
 
