@@ -11,7 +11,8 @@ from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import TOLERANCES, Problem
 from diagnosis.fits.residuals import Data
-from diagnosis.fits.search import Search, exchanged_pair, tied
+from diagnosis.fits.search import Search, exchanged_pair
+from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps, leaves
 from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN
 from diagnosis.recorded.parts import MODEL_ERROR
@@ -85,7 +86,7 @@ def judge(search: Search) -> PartVerdict:
         math.exp(-min(max((other.cost - chosen.cost) / noise, 0.0) / (2.0 * TEMPERATURE), 700.0))
         for other in search.alternatives
     ]
-    same = [tied(search, other) for other in search.alternatives]
+    same = [tied(chosen, other) for other in search.alternatives]
     whole = 1.0 + sum(odds)
     named = (1.0 + sum(value for value, yes in zip(odds, same, strict=True) if yes)) / whole
     sure = (1.0 - DOUBT[outcome]) * certainty(search)
@@ -222,7 +223,7 @@ def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
     nearest: dict[str, tuple[float, str]] = {}
     for other in search.alternatives:
         pair = exchanged_pair(search.chosen, other)
-        if pair is None or not tied(search, other):
+        if pair is None or not tied(search.chosen, other):
             continue
         gone, come = pair
         apart = float(np.sum(np.square(other.reduced - search.chosen.reduced)))

@@ -11,6 +11,7 @@ import numpy as np
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import Interval, PartVerdict, intervals
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps
 from diagnosis.fits.worth import PRIOR_GAIN
 from diagnosis.report.records import Candidate
@@ -46,8 +47,9 @@ def which(found: Diagnosis, sure: float = 1.0) -> Named:
     ]
     others.sort(key=lambda item: -(item.probability or 0.0))
     first = entry(effects, probability, parameters, 0.0)
-    ends = tuple(warning for name, values in fits.items() for warning in at_the_end(catalogue[name], values))
-    return Named((first, *others[:MOST_OTHERS]), ends)
+    ends = [warning for name, values in fits.items() for warning in at_the_end(catalogue[name], values)]
+    as_good = [sentence for verdict in named for sentence in other_numbers(verdict)]
+    return Named((first, *others[:MOST_OTHERS]), (*ends, *as_good))
 
 
 def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:
@@ -68,6 +70,27 @@ def at_the_end(effect: Effect, values: Mapping[str, Interval]) -> list[str]:
         for key, item in values.items()
         if item.on_bound and key not in shapes
     ]
+
+
+def other_numbers(verdict: PartVerdict) -> list[str]:
+    """A sentence for each description of a part by more or fewer effects that the data cannot tell from the verdict."""
+    chosen = verdict.search.chosen
+    return [
+        f"These signals cannot separate {described(chosen)} from {described(other)}: the verdict names the one with "
+        "fewer free parameters."
+        for other in verdict.search.alternatives
+        if len(other.names) != len(chosen.names) and tied(chosen, other)
+    ]
+
+
+def described(fit: Fit) -> str:
+    """The effects of a fit, with the law of each that has not the first of its laws."""
+    laws = {name: fit.data.catalogue[name].law(values) for name, values in fit.values.items()}
+    words = [
+        f"{name} (law {law.name})" if law and fit.values[name].get("law") else name
+        for name, law in laws.items()
+    ]
+    return " with ".join(words)
 
 
 def seen(found: Diagnosis) -> dict[str, dict[str, Value]]:

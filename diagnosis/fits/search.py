@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from diagnosis.fits import candidates, fitting, hypothesis, settling, worth
-from diagnosis.fits.candidates import TIED
+from diagnosis.fits import candidates, fitting, hypothesis, settling, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
+from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import remaining
 
 MOST = 3  # effects of one part: more of them can imitate any residual
@@ -47,9 +47,9 @@ def search(data: Data, scales: Scales) -> Search:
     bare, chosen, first = selected(bare, first, scales)
     if not chosen.names:
         return Search(bare.data, bare, chosen, ())
-    chosen = pruned(bare, chosen)
-    others = tuple(map(trimmed, candidates.alternatives(chosen, first, scales)))
-    return physical(Search(bare.data, bare, trimmed(chosen), others))
+    chosen, as_good = trade.traded(bare, pruned(bare, chosen), first, scales, MOST)
+    others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
+    return physical(Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others))))
 
 
 def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, list[Fit]]:
@@ -104,19 +104,17 @@ def trimmed(fit: Fit) -> Fit:
     return replace(fit, values=values) if values != fit.values else fit
 
 
-def tied(search: Search, other: Fit) -> bool:
-    """Whether the data cannot tell another fit from the chosen one."""
-    noise = max(1.0, search.chosen.chi / search.chosen.reduced.size)
-    return (other.cost - search.chosen.cost) / noise < TIED
-
-
 def physical(search: Search) -> Search:
     """The search with a machine's effect in front where the data cannot tell it from a sensor's."""
     catalogue = search.data.catalogue
     measured = sum(catalogue[name].kind == "measurement" for name in search.chosen.names)
     for other in search.alternatives:
         artefacts = sum(catalogue[name].kind == "measurement" for name in other.names)
-        if artefacts < measured and len(other.names) == len(search.chosen.names) and tied(search, other):
+        if (
+            artefacts < measured
+            and len(other.names) == len(search.chosen.names)
+            and tied(search.chosen, other)
+        ):
             rest = [search.chosen, *(item for item in search.alternatives if item is not other)]
             return replace(search, chosen=other, alternatives=tuple(rest))
     return search

@@ -1,4 +1,8 @@
-"""A drive without a spring, imported: friction and a constant force found although its replay from rest would drift."""
+"""A drive without a spring, imported: friction and a constant force found although its replay from rest would drift.
+
+In such a drive friction with a constant force is the same as friction that is larger in one direction. The pair has
+fewer free parameters than that law of friction, so it is named, and the report says that the law explains as much.
+"""
 
 from __future__ import annotations
 
@@ -76,4 +80,6 @@ def test_friction_of_a_drive_without_a_spring(tmp_path: Path) -> None:
     assert set(first["effects"]) == {"damper.friction", "damper.offset"}
     assert first["parameters"]["damper.friction"]["force"]["value"] == pytest.approx(FRICTION, rel=0.02)
     assert first["parameters"]["damper.offset"]["force"]["value"] == pytest.approx(OFFSET, rel=0.05)
+    alike = "damper.friction with damper.offset from damper.friction (law by direction and speed)"
+    assert any(f"cannot separate {alike}" in warning for warning in report["warnings"])
     assert report["where"][0]["site"] == "damper"

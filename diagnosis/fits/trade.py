@@ -1,0 +1,98 @@
+"""Other numbers of effects that explain as much: one in the place of two, and two in the place of one.
+
+Selection one by one does not reach them. Of descriptions that the data cannot tell apart the one with the fewest free
+parameters stands, of these the one with the fewest effects (Schwarz, Annals of Statistics 6 (1978)); the others are
+kept beside it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from diagnosis.fits import candidates, fitting, worth
+from diagnosis.fits.candidates import TIED
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import Problem
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.unexplained import leaves
+
+# Squared distance of two predictions, in noise. Where one of them is true, their costs differ by this distance, give or
+# take twice its root: from here on by more than `TIED`, but for one chance in a thousand.
+APART = 36.0
+RIVALS = 2  # single effects behind the best one that are tried with a second one
+TRIED = 3  # candidates that are fitted in such a place: they must come close at once
+
+
+def tied(chosen: Fit, other: Fit) -> bool:
+    """Whether the data cannot tell another fit from the chosen one: it fits as well and predicts the same.
+
+    Two fits that miss the data as far in different ways are not the same: more data would decide between them.
+    """
+    noise = max(1.0, chosen.chi / chosen.reduced.size)
+    apart = float(np.sum(np.square(other.reduced - chosen.reduced)))
+    return (other.cost - chosen.cost) / noise < TIED and apart / noise < APART
+
+
+def freedom(fit: Fit) -> tuple[int, int]:
+    """How many parameters of effects a fit moves, and how many effects it has."""
+    return len(Problem(fit.data, fit.values).frees), len(fit.names)
+
+
+def traded(
+    bare: Fit, chosen: Fit, first: list[Fit], scales: Scales, most: int
+) -> tuple[Fit, tuple[Fit, ...]]:
+    """The best description with one effect more or less, and those with another number that are as good.
+
+    `first` are the fits with one effect, best first; no description has more than `most` effects.
+    """
+    found = joined(chosen, scales)
+    if len(chosen.names) < most:
+        found += parted(bare, chosen, scales)
+        found += paired(bare, chosen, first, scales)
+    return simplest([chosen, *found])
+
+
+def simplest(fits: Sequence[Fit]) -> tuple[Fit, tuple[Fit, ...]]:
+    """Of fits that the data cannot tell from the best the simplest, and those of them with more or fewer effects."""
+    best = min(fits, key=lambda item: item.cost)
+    level = [item for item in fits if tied(best, item)]
+    stands = min(level, key=freedom)
+    return stands, tuple(item for item in level if len(item.names) != len(stands.names))
+
+
+def joined(fit: Fit, scales: Scales) -> list[Fit]:
+    """Fits with one effect in the place of two of three."""
+    result = []
+    for gone in itertools.combinations(fit.names, 2):
+        kept = {name: values for name, values in fit.values.items() if name not in gone}
+        if kept:
+            less = fitting.fit(fit.data, kept, fit.z)
+            result += candidates.extended(less, scales, count=TRIED, known=fit)[:1]
+    return result
+
+
+def parted(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:
+    """Fits in which an effect has the first of its laws and another effect stands beside it, as good or worth it."""
+    result = []
+    for name, values in fit.values.items():
+        if not values.get("law"):
+            continue
+        usual = fit.data.catalogue[name].under(0, values)
+        plain = fitting.fit(fit.data, fit.values | {name: usual}, fit.z)
+        others = candidates.extended(plain, scales, count=TRIED, known=fit)[:1]
+        result += [item for item in others if tied(fit, item) or worth.is_worth(bare, fit, item)]
+    return result
+
+
+def paired(bare: Fit, fit: Fit, first: list[Fit], scales: Scales) -> list[Fit]:
+    """Fits with two effects, without the one that a fit has by itself, where that one leaves more than noise."""
+    if len(fit.names) != 1 or not leaves(fit):
+        return []
+    result = []
+    for rival in [item for item in first if item.names != fit.names][:RIVALS]:
+        others = candidates.extended(rival, scales, count=TRIED, known=fit)[:1]
+        result += [item for item in others if worth.is_worth(bare, fit, item)]
+    return result

@@ -1,0 +1,44 @@
+"""One effect in the place of two, or two in the place of one: which description of a part stands."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.findings.which import described
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.trade import simplest, tied
+from laboratories.effects import CATALOGUE
+from models.registry import Array
+from tests.diagnosis.test_equivalents import DATA, NOISY
+
+FRICTION = CATALOGUE["damper.friction"]
+COULOMB = {"force": 20.0, "velocity": 1e-6}
+SIDED = {"damper.friction": FRICTION.under(1, COULOMB)}
+PAIR = {"damper.friction": COULOMB, "sensor.column_force.bias": {"offset": 3.0}}
+
+
+def fit(values: dict[str, dict[str, float]], off: Array | float = 0.0) -> Fit:
+    return Fit(DATA, values, np.zeros(0), NOISY + off)
+
+
+def test_of_two_descriptions_that_predict_the_same_the_one_with_fewer_free_parameters_stands() -> None:
+    one, two = fit(SIDED), fit(PAIR, 1e-4)
+    for both in ([one, two], [two, one]):
+        assert simplest(both) == (two, (one,))
+
+
+def test_a_description_that_fits_better_stands_however_many_parameters_it_has() -> None:
+    one, two = fit(SIDED), fit(PAIR, 0.2)
+    assert simplest([two, one]) == (one, ())
+
+
+def test_fits_that_miss_the_data_as_far_in_different_ways_are_not_the_same() -> None:
+    miss = np.where(np.arange(DATA.groups)[:, None] % 2, 1.0, -1.0)
+    one, two = (fit(PAIR, sign * miss - NOISY) for sign in (1.0, -1.0))
+    assert one.cost == two.cost
+    assert not tied(one, two)
+
+
+def test_a_description_is_told_with_its_laws() -> None:
+    assert described(fit(SIDED)) == "damper.friction (law by direction and speed)"
+    assert described(fit(PAIR)) == "damper.friction with sensor.column_force.bias"
