@@ -137,7 +137,12 @@ BUILDING = (
 CLIENT = (
     SEQ,
     TIME,
-    Signal("client_step", "", "displacements that the client has asked for so far", FieldType.COUNT),
+    Signal(
+        "client_step",
+        "",
+        "steps of the client so far, those at rest too",
+        FieldType.COUNT,
+    ),
     Signal("client_time", "s", "time of the client's analysis at the newest of them"),
     Signal("client_displacement", "m", "displacement that the client wants, at the end of its step"),
     Signal("client_force", "N", "force handed to the client at this tick, NaN where none was"),

@@ -63,7 +63,7 @@ def fastest(folder: Path, steps: int, repeats: int) -> Iterator[BenchmarkFigure]
         "Linear",
     ]
     clients = {
-        "OpenSees": [*model, str(steps), "1", PORT],
+        "OpenSees": [*model, str(steps), "0", "1", PORT],
         "a client of plain Python": [sys.executable, str(HERE / "client.py"), PORT, str(steps)],
     }
     for name, words in clients.items():

@@ -1,7 +1,9 @@
 """A model for OpenSees in another interpreter, which has no other module of this project: one storey, two at most.
 
-`python model.py INTEGRATOR ALGORITHM STEPS LABORATORIES PORT …` prints the displacements after every step as JSON;
-without a port springs stand in the laboratories' place, and with one port for two laboratories one element has both.
+`python model.py INTEGRATOR ALGORITHM STEPS REST LABORATORIES PORT …` prints the displacements after every step of the
+transient analysis as JSON; without a port springs stand in the laboratories' place, and with one port for two
+laboratories one element has both. REST steps of a static analysis without load come before it, and its ground is at
+rest for as many of its STEPS.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ INTEGRATORS = {
 }
 
 
-def build(ops: Any, integrator: str, algorithm: str, laboratories: int, ports: list[int]) -> None:
+def build(ops: Any, laboratories: int, ports: list[int]) -> None:
     """Storeys of 160 t, each with a laboratory or a spring of its stiffness."""
     ops.model("basic", "-ndm", 1, "-ndf", 1)
     ops.node(1, 0.0)
@@ -35,16 +37,35 @@ def build(ops: Any, integrator: str, algorithm: str, laboratories: int, ports: l
         ops.uniaxialMaterial("Elastic", floor, 18.75e6, 200e3)
         ops.element("zeroLength", floor, 1, floor, "-mat", floor, "-dir", 1)
     place(ops, floors, ports)
-    motion = [0.3 * math.sin(0.05 * i) for i in range(10_000)]
+
+
+def hold(ops: Any, steps: int) -> None:
+    """A static analysis without load, as of a building whose gravity loads the laboratories do not feel."""
+    prepare(ops, "Linear")
+    ops.integrator("LoadControl", 1.0 / steps)
+    ops.analysis("Static")
+    ops.analyze(steps)
+    ops.loadConst("-time", 0.0)
+    ops.wipeAnalysis()
+
+
+def shake(ops: Any, integrator: str, algorithm: str, rest: int) -> None:
+    """Prepare the transient analysis of a motion that begins after `rest` steps."""
+    motion = [0.0] * rest + [0.3 * math.sin(0.05 * i) for i in range(10_000)]
     ops.timeSeries("Path", 1, "-dt", STEP, "-values", *motion)
     ops.pattern("UniformExcitation", 1, 1, "-accel", 1)
+    prepare(ops, algorithm)
+    ops.integrator(integrator, *INTEGRATORS[integrator])
+    ops.analysis("Transient")
+
+
+def prepare(ops: Any, algorithm: str) -> None:
+    """What every analysis needs but its integrator."""
     ops.constraints("Plain")
     ops.numberer("Plain")
     ops.system("FullGeneral")
     ops.test("NormUnbalance", 1e-6, 10)
     ops.algorithm(algorithm)
-    ops.integrator(integrator, *INTEGRATORS[integrator])
-    ops.analysis("Transient")
 
 
 def place(ops: Any, floors: list[int], ports: list[int]) -> None:
@@ -64,9 +85,12 @@ def place(ops: Any, floors: list[int], ports: list[int]) -> None:
 
 def main() -> int:
     """Analyse, and print what came out."""
-    integrator, algorithm, steps, laboratories, *ports = sys.argv[1:]
+    integrator, algorithm, steps, rest, laboratories, *ports = sys.argv[1:]
     ops = import_module("openseespy.opensees")
-    build(ops, integrator, algorithm, int(laboratories), [int(port) for port in ports])
+    build(ops, int(laboratories), [int(port) for port in ports])
+    if int(rest):
+        hold(ops, int(rest))
+    shake(ops, integrator, algorithm, int(rest))
     found, began = [], 0.0
     for _ in range(int(steps)):
         if ops.analyze(1, STEP):

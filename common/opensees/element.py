@@ -6,6 +6,11 @@ reached the displacements that it belongs to.
 
 A deformation of a specimen cannot be undone. Within one step, which ends with a commit or, for OpenFresco, which does
 not commit, with an acquisition, displacements may therefore change once; further changes are refused.
+
+Each step of the analysis is one step of the test, also where the structure is at rest. Only the commit tells that
+a step leaves the displacements as they are: before it the integrator may still change them. Such a step is imposed at
+its commit. Of OpenFresco an equal displacement may be a predictor or a step at rest, and nothing in its messages tells
+which: it is acquired at once, and is no step of the test.
 """
 
 from __future__ import annotations
@@ -60,18 +65,17 @@ class ElementServer:
         n = len(stiffness)
         self.phase = Phase.GREETING
         self.header: ClientHeader | None = None
-        self.steps = 0  # displacements that differ from those before them
+        self.steps = 0  # steps of the test in which this element takes part
         self.commits = 0
         self.wanted = Quantities(displacement=(0.0,) * n)
         self._diagonal = [
             k for row in range(n) for k in (0.0,) * row + (stiffness[row],) + (0.0,) * (n - row - 1)
         ]
+        self._latest = b""  # the trial received last
         self._measured = Measurement((0.0,) * n, (0.0,) * n, 0.0)
         self._moved = False  # whether displacements have changed in the present step
         self._asked: MessageCode | None = None  # a request, or the end, that waits for the measurement
-        self._next: bytes = (
-            b""  # a message with displacements that waits until the previous ones are measured
-        )
+        self._next = b""  # a trial or commit that waits until the displacements before it are measured
         self._heard = False
         self._zeros = b""  # the answer for a matrix of zeros
         self._in = bytearray()
@@ -122,6 +126,11 @@ class ElementServer:
         """Mark the wanted displacements as being imposed, and return them."""
         self.phase = Phase.MOVING
         return self.wanted
+
+    def rest(self) -> None:
+        """Take part in a step of the test that other elements need, at the displacements imposed last."""
+        self.phase = Phase.MOVING
+        self.steps += 1
 
     def measured(self, found: Measurement) -> None:
         """Take the measurements at the displacements imposed last, and answer a waiting request; raises as `take`."""
@@ -179,17 +188,17 @@ class ElementServer:
         if code is MessageCode.TRIAL:
             self._trial(data)
         elif code is MessageCode.COMMIT:
-            self.commits += 1
-            self._moved = False
+            self._commit(data)
         elif code in wire.MATRICES or self.phase is Phase.MEASURED:
             self._answer(code)
         else:
             self._asked = code
 
     def _trial(self, data: bytes) -> None:
-        """Take displacements; equal ones to the previous are ignored."""
+        """Take displacements; whether equal ones are a step of the test is decided by the commit."""
         assert self.header is not None  # noqa: S101 - messages follow the header
         n = self.header.control.displacement
+        self._latest = data
         if wire.numbers_in(self.header, data, n, first=1) == self.wanted.displacement:
             return
         values = wire.commanded(self.header, data)
@@ -205,6 +214,21 @@ class ElementServer:
             self._next = data
             return
         self._moved = True
+        self._want(values)
+
+    def _commit(self, data: bytes) -> None:
+        """End a step of the analysis; one that has not been a step of the test yet becomes one at rest."""
+        assert self.header is not None  # noqa: S101 - messages follow the header
+        if self.steps <= self.commits:
+            if self.phase is not Phase.MEASURED:  # the step before it must be measured first
+                self._next = data
+                return
+            latest = wire.commanded(self.header, self._latest or data)
+            self._want(latest._replace(displacement=self.wanted.displacement))
+        self.commits += 1
+        self._moved = False
+
+    def _want(self, values: Quantities) -> None:
         self.wanted, self.phase = values, Phase.WANTED
         self.steps += 1
 

@@ -30,6 +30,9 @@ from models.compiled import bound
 
 # relative difference of the client's step from the plan's that is rounding of the client's times
 SCALE = 1e-6
+TOLD = (
+    10  # time steps of the client that are recorded; an analysis with variable steps would fill the recording
+)
 NOTHING = math.nan  # recorded where a tick has no value
 
 
@@ -57,6 +60,7 @@ class ClientBuilding(BuildingStep):
         self._moving, self._done = False, 0  # whether a displacement is under way, and its intervals so far
         self._from = self._to = (0.0,) * len(self._labs)
         self._time = self._step_time = 0.0
+        self._scales: list[float] = []  # the client's time steps (s) that have been recorded
         self._steps = 0
         self._handed = (NOTHING,) * len(self._labs)
         self._handed_ns, self._wait = 0, NOTHING
@@ -156,28 +160,43 @@ class ClientBuilding(BuildingStep):
     def _impose(self) -> None:
         assert self._lab is not None  # noqa: S101 - `join` comes first
         wanted: list[float] = []
+        times: list[float] = []
         for server in self._ports.servers:
             if server.phase is Phase.WANTED:
-                at = server.impose().time
-                self._step_time, self._time = (at[0] - self._time, at[0]) if at else (0.0, 0.0)
+                times += server.impose().time
+            elif server.phase is Phase.MEASURED:
+                server.rest()
             wanted += server.wanted.displacement
         self._from, self._to = self._to, tuple(wanted)
         self._moving, self._done = True, 0
         self._steps += 1
         if self._handed_ns:
             self._wait = (self._lab.clock.now() - self._handed_ns) * 1e-9
-        if self._steps == 3:  # the first step may begin at any time, and some integrators repeat that time
-            self._tell_scale()
+        if times:
+            self._note_time(times[0])
 
-    def _tell_scale(self) -> None:
-        """Record the client's time step beside that of the test, if it is known."""
+    def _note_time(self, at: float) -> None:
+        """Keep the client's time (s), and record its time step where it has it twice in succession and it is new.
+
+        The first step may begin at any time, and some integrators repeat that time; an analysis under gravity before
+        that of the earthquake has a step of its own.
+        """
+        before, self._step_time, self._time = self._step_time, at - self._time, at
+        if self._steps < 3 or not _same(self._step_time, before) or self._step_time <= 0.0:
+            return
+        if len(self._scales) < TOLD and not any(_same(self._step_time, told) for told in self._scales):
+            self._scales.append(self._step_time)
+            self._tell_scale(self._step_time)
+
+    def _tell_scale(self, there: float) -> None:
+        """Record the client's time step `there` (s) beside that of the test."""
         assert self._lab is not None  # noqa: S101 - `join` comes first
-        here, there = self._interval * self._intervals, self._step_time
-        if there > 0.0:
-            same = abs(there - here) <= SCALE * here
-            text = f"A step of the client's is {1e3 * there:g} ms of its analysis, and takes {1e3 * here:g} ms here."
-            level = "info" if same else "warning"
-            self._lab.note("client", text, level=level, tick=self._lab.tick, values={"scale": here / there})
+        here = self._interval * self._intervals
+        text = (
+            f"A step of the client's is {1e3 * there:g} ms of its analysis, and takes {1e3 * here:g} ms here."
+        )
+        level = "info" if _same(there, here) else "warning"
+        self._lab.note("client", text, level=level, tick=self._lab.tick, values={"scale": here / there})
 
     def _move(self, position: float) -> Outputs:
         """The targets and commands of all laboratories for the coming interval."""
@@ -267,6 +286,11 @@ class ClientBuilding(BuildingStep):
             return work(given)
         except RevisedError as error:
             raise InterlockError(str(error)) from None
+
+
+def _same(one: float, other: float) -> bool:
+    """Whether two time steps (s) differ by the rounding of times alone."""
+    return abs(one - other) <= SCALE * abs(other)
 
 
 def compensator(plan: Plan) -> Callable[..., float]:

@@ -12,7 +12,7 @@ from common.opensees.wire import ClientHeader, MessageCode, Quantities, Sizes
 
 HOST = "127.0.0.1"
 FRESCO = ClientHeader(Sizes(displacement=1), Sizes(displacement=1, force=1, time=1), 256)
-PATIENCE_S = 20.0
+PATIENCE_S = 200.0  # s, for what may hang; it ends in well under a second
 
 
 def free_port() -> int:

@@ -84,13 +84,18 @@ def plan_of(text: str = ALONE) -> Plan:
 
 
 def serve(
-    script: Callable[[int], None], folder: Path, plan: Plan | None = None, pace: Pace | None = None
+    script: Callable[..., None],
+    folder: Path,
+    plan: Plan | None = None,
+    pace: Pace | None = None,
+    elements: int = 1,
 ) -> Served:
-    """Serve a client, whose `script` is given its port, to the end."""
-    chosen, number = plan or plan_of(), free_port()
+    """Serve a client, whose `script` is given its ports, one for each of its elements, to the end."""
+    chosen, numbers = plan or plan_of(), [free_port() for _ in range(elements)]
     warm_up_served(as_planned(chosen))  # which takes its time where nothing is compiled yet
-    building = ClientBuilding(chosen, [f"127.0.0.1:{number}"], pace or AsFastAsItGoes(PATIENCE_S, str))
-    client, end = Script(lambda: script(number)), time.monotonic() + PATIENCE_S
+    addresses = [f"127.0.0.1:{number}" for number in numbers]
+    building = ClientBuilding(chosen, addresses, pace or AsFastAsItGoes(PATIENCE_S, str))
+    client, end = Script(lambda: script(*numbers)), time.monotonic() + PATIENCE_S
     while building.awaited and time.monotonic() < end:
         building.look_after()
     assert not building.awaited

@@ -24,7 +24,7 @@ import pytest
 from common.opensees import wire
 from common.opensees.wire import ClientHeader, MessageCode, Sizes
 from tests.helpers import ROOT
-from tests.serve.client import FRESCO, HOST, Element
+from tests.serve.client import FRESCO, HOST, PATIENCE_S, Element
 from tests.serve.serving import Served, Ticking, serve
 
 SAFE_S = 0.010
@@ -235,7 +235,7 @@ def whole(served: Served) -> None:
 def test_a_second_client_is_turned_away_and_the_first_goes_on(tmp_path: Path) -> None:
     def two(port: int) -> None:
         client = begun(port)
-        other = socket.create_connection((HOST, port), timeout=20.0)
+        other = socket.create_connection((HOST, port), timeout=PATIENCE_S)
         for i in range(STEPS, 3 * STEPS):
             client.step([1e-4 * (i + 1)])
         assert other.recv(1) == b""
@@ -258,11 +258,11 @@ def test_a_second_client_is_turned_away_and_the_first_goes_on(tmp_path: Path) ->
 def test_a_flood_of_clients_is_turned_away_and_told_of_ten_times(tmp_path: Path) -> None:
     def many(port: int) -> None:
         client = begun(port)
-        others = [socket.create_connection((HOST, port), timeout=20.0) for _ in range(7)]
+        others = [socket.create_connection((HOST, port), timeout=PATIENCE_S) for _ in range(7)]
         for i in range(STEPS, 6 * STEPS):
             client.step([1e-4 * (i + 1)])
             if i % 8 == 0:
-                others += [socket.create_connection((HOST, port), timeout=20.0) for _ in range(3)]
+                others += [socket.create_connection((HOST, port), timeout=PATIENCE_S) for _ in range(3)]
         client.say(MessageCode.END)
         for one in (*others, client.socket):
             one.close()
@@ -288,7 +288,7 @@ def test_a_client_that_cannot_be_served_makes_room_for_the_next(
 ) -> None:
     def script(port: int) -> None:
         first = Element.__new__(Element)
-        first.socket = socket.create_connection((HOST, port), timeout=20.0)
+        first.socket = socket.create_connection((HOST, port), timeout=PATIENCE_S)
         first.raw(header)
         assert first.socket.recv(1) == b""
         first.close()
@@ -308,10 +308,12 @@ def test_a_client_that_leaves_before_it_moves_anything_makes_room_for_the_next(
 ) -> None:
     def script(port: int) -> None:
         if early == "looks":
-            socket.create_connection((HOST, port), timeout=20.0).close()
+            socket.create_connection((HOST, port), timeout=PATIENCE_S).close()
         else:
             client = Element(port)
-            client.step([0.0])
+            client.say(MessageCode.TRIAL, [0.0])
+            client.say(MessageCode.FORCE, [0.0])
+            client.answer(1)
             if early == "ends":
                 client.say(MessageCode.END)
             client.close()

@@ -11,7 +11,7 @@ import pytest
 from common.opensees import wire
 from common.opensees.wire import MessageCode
 from common.plan.plan import Plan
-from common.plan.read import parse
+from common.plan.read import parse, with_test
 from common.roles import SLAVE
 from laboratories.table.kind import TABLE
 from loop import replay
@@ -96,3 +96,31 @@ def test_a_rig_of_the_users_own_stands_behind_an_element(tmp_path: Path) -> None
     places, forces, columns = swayed(tmp_path, parse(IDEAL + ALONE + rig, tmp_path))
     assert forces[:, 0] == pytest.approx(9e6 * 0.5 * places, rel=1e-12)  # the half column's deformation
     assert columns["master"]["column_displacement"][1:STEPS] == pytest.approx(0.5 * places[:-1], rel=1e-12)
+
+
+def test_a_step_in_which_one_element_moves_is_one_step_of_the_other_at_rest(tmp_path: Path) -> None:
+    """Within a step OpenSees tells all elements their displacements, then asks all for forces, then commits all."""
+    moves = [1e-4 * step for step in range(1, 21)]
+
+    def script(first: int, second: int) -> None:
+        both = [Element(first), Element(second)]
+        for step, place in enumerate([*moves, *moves[-1:] * 5], 1):
+            for client, x in zip(both, (place, 0.0), strict=True):
+                client.say(MessageCode.TRIAL, [x], 0.002 * step)
+            for client, x in zip(both, (place, 0.0), strict=True):
+                client.say(MessageCode.FORCE, [x])
+                client.answer(1)
+            for client, x in zip(both, (place, 0.0), strict=True):
+                client.say(MessageCode.COMMIT, [x])
+        for client in both:
+            client.say(MessageCode.END)
+            client.close()
+
+    plan = with_test(parse(IDEAL + '[slave.east]\nkind = "column"\n', tmp_path), intervals=2)
+    served = serve(script, tmp_path, plan, elements=2)
+    assert served.error is None
+    assert served.client.error is None
+    of = served.run.columns["master"]
+    assert of["client_step"][-1] == len(moves) + 5
+    assert of["client_displacement"][1:41:2, 0] == pytest.approx(moves)
+    assert not of["client_displacement"][:, 1].any()

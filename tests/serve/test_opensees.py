@@ -29,7 +29,7 @@ from tests.serve.client import PATIENCE_S, free_port
 from tests.serve.serving import ALONE, plan_of
 
 MODEL = ROOT / "benchmarks" / "opensees" / "model.py"
-STEPS = 400
+STEPS, REST = 400, 20
 pytestmark = pytest.mark.skipif(bool(lacking()), reason=lacking())
 EXPLICIT = ("NewmarkExplicit", "CentralDifference", "AlphaOS")
 TWICE = '[slave.east]\nkind = "column"\n'
@@ -55,13 +55,13 @@ def answered(process: subprocess.Popen[str]) -> Any:
 
 
 def served(
-    folder: Path, plan: Plan, integrator: str, algorithm: str = "Linear", *, elements: int = 1
+    folder: Path, plan: Plan, integrator: str, algorithm: str = "Linear", *, elements: int = 1, rest: int = 0
 ) -> tuple[Any, Any, Any]:
     """The error that ended the test, what OpenSees found, and the recording."""
     ports, laboratories = [free_port() for _ in range(elements)], len(plan.kinds)
     addresses = [f"127.0.0.1:{port}" for port in ports]
     building = ClientBuilding(plan, addresses, AsFastAsItGoes(PATIENCE_S, str))
-    with opensees(integrator, algorithm, STEPS, laboratories, *ports) as process:
+    with opensees(integrator, algorithm, STEPS, rest, laboratories, *ports) as process:
         end = time.monotonic() + PATIENCE_S
         while building.awaited and process.poll() is None and time.monotonic() < end:
             building.look_after()
@@ -75,9 +75,9 @@ def served(
     return error, found, read(folder / "test.mcap")
 
 
-def springs(integrator: str, laboratories: int = 1, algorithm: str = "Linear") -> Any:
+def springs(integrator: str, laboratories: int = 1, algorithm: str = "Linear", rest: int = 0) -> Any:
     """The same model with springs of its own."""
-    return answered(opensees(integrator, algorithm, STEPS, laboratories))
+    return answered(opensees(integrator, algorithm, STEPS, rest, laboratories))
 
 
 def same(found: Any, expected: Any) -> None:
@@ -106,6 +106,29 @@ def test_two_laboratories_are_one_element_or_two(integrator: str, elements: int,
     same(found, springs(integrator, 2))
     assert run.columns["master"]["client_displacement"].shape[1] == 2
     assert run.shared["client_force"] == ("master", "slave.east")
+
+
+@pytest.mark.parametrize("integrator", [*EXPLICIT, "Newmark"])
+def test_every_step_of_an_analysis_is_one_of_the_test_at_rest_too(integrator: str, tmp_path: Path) -> None:
+    """A static analysis that moves nothing, a motion that begins with zeros, then the motion."""
+    error, found, run = served(tmp_path, plan_of(), integrator, rest=REST)
+    assert error is None
+    same(found, springs(integrator, rest=REST))
+    of = run.columns["master"]
+    assert of["client_step"].tolist() == list(range(1, REST + STEPS + 1))
+    assert np.max(np.abs(of["client_displacement"][: 2 * REST])) < 1e-15  # rounding of the motion's times
+    assert np.all(of["client_displacement"][2 * REST + 2 :] != 0.0)
+    told = [event["text"].split(" ms ")[0] for event in run.events if "of its analysis" in event["text"]]
+    assert told == ["A step of the client's is 50", "A step of the client's is 2"]
+
+
+def test_steps_at_rest_are_counted_once_for_two_elements(tmp_path: Path) -> None:
+    error, found, run = served(
+        tmp_path, with_test(plan_of(TWICE), intervals=2), EXPLICIT[0], elements=2, rest=REST
+    )
+    assert error is None
+    same(found, springs(EXPLICIT[0], 2, rest=REST))
+    assert run.columns["master"]["client_step"][-1] == REST + STEPS
 
 
 def test_newton_on_linear_laboratories_imposes_each_displacement_once(tmp_path: Path) -> None:

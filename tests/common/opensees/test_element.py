@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import pytest
@@ -99,6 +100,49 @@ def test_a_step_of_central_difference_commits_before_it_asks_for_the_force() -> 
     assert one.phase is Phase.WANTED
 
 
+def test_a_step_that_leaves_the_displacement_is_a_step_at_rest_from_its_commit_on() -> None:
+    """Before the commit the integrator may still change it, so the force is that of the previous step."""
+    one = server()
+    for step in range(1, 4):
+        one.take(said(MessageCode.TRIAL) + said(MessageCode.FORCE) + said(MessageCode.TRIAL))
+        assert one.steps == step - 1
+        one.take(said(MessageCode.COMMIT))
+        assert one.phase is Phase.WANTED
+        moved(one, float(step))
+    assert answers(one) == [(0.0,), (1.0,), (2.0,)]
+    assert (one.steps, one.commits) == (3, 3)
+
+
+def test_a_step_that_changes_the_displacement_after_its_force_is_one_step() -> None:
+    """Newmark with algorithm('Linear'): the predictor repeats the displacement, and the solution changes it."""
+    one = server()
+    for step, x in enumerate((0.0, 1e-3, 1e-3, 2e-3), 1):
+        one.take(said(MessageCode.TRIAL, one.wanted.displacement[0]) + said(MessageCode.FORCE))
+        one.take(said(MessageCode.TRIAL, x) + said(MessageCode.COMMIT))
+        assert one.wanted.displacement == (x,)
+        moved(one, float(step))
+    assert answers(one) == [(0.0,), (1.0,), (2.0,), (3.0,)]
+    assert (one.steps, one.commits) == (4, 4)
+
+
+def test_steps_at_rest_of_a_client_that_does_not_wait_come_one_after_the_other() -> None:
+    one = server()
+    one.take((said(MessageCode.TRIAL, 1e-3) + said(MessageCode.COMMIT)) * 3 + said(MessageCode.END))
+    found = 0
+    while one.phase is Phase.WANTED:
+        found += 1
+        moved(one, 0.0)
+    assert (found, one.steps, one.commits) == (3, 3, 3)
+    assert one.phase is Phase.ENDED
+
+
+def test_a_step_at_rest_with_a_velocity_that_is_not_finite_is_refused() -> None:
+    one = server()
+    one.take(wire.message(HEADER, MessageCode.TRIAL, Quantities((0.0,), (math.nan,), (0.0,), (), (0.0,))))
+    with pytest.raises(RemoteProtocolError, match="not finite"):
+        one.take(said(MessageCode.COMMIT))
+
+
 def test_a_revised_displacement_is_refused_with_integrators_that_fit() -> None:
     one = server()
     one.take(said(MessageCode.TRIAL, 1e-3) + said(MessageCode.FORCE))
@@ -145,6 +189,7 @@ def test_openfresco_acquires_all_that_its_header_says_and_commits_nothing() -> N
         one.take(said(MessageCode.TRIAL, x, FRESCO) + said(MessageCode.ACQUIRE, x, FRESCO))
         one.impose()
         one.measured(Measurement((x,), (K * x,), 0.25))
+    assert one.steps == 2  # nothing tells whether an equal displacement is a predictor or a step at rest
     assert answers(one, FRESCO, 3) == [(0.0, 0.0, 0.0), (1e-3, K * 1e-3, 0.25), (2e-3, K * 2e-3, 0.25)]
 
 
