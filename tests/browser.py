@@ -1,4 +1,4 @@
-"""A page in Debian's Chromium, headless: what it complains of, what it draws, what it says to JavaScript."""
+"""Opens a page in headless Chromium: its console errors, its picture, and the values of JavaScript expressions."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ LIMIT_S = 60.0  # for a browser to start, a page to load, a picture to be made
 
 
 def chromium() -> str | None:
-    """The browser of this machine, None where there is none."""
+    """The path of this machine's browser, None where there is none."""
     return next((found for name in NAMES if (found := shutil.which(name))), None)
 
 
 class Page:
-    """An open page; `errors` are what its console and its scripts complained of, `requests` the addresses it asked."""
+    """An open page; `errors` holds the errors of its console and scripts, `requests` the addresses it requested."""
 
     def __init__(self, page: Any) -> None:
         self._page = page

@@ -14,7 +14,7 @@ DAY = timedelta(days=1)
 
 
 def made(folder: Path, *, begin: datetime = NOW - DAY, end: datetime = NOW + DAY) -> dict[str, keys.Owner]:
-    """The files of an authority of its own, and one more of hers, for a visitor who has no part in a test."""
+    """The files of a new authority, with one more certificate of that authority for a visitor outside the test."""
     owners = keys.certificates((*ROLES, "visitor"), (), begin, end)
     keys.write(folder, owners)
     return owners
@@ -28,7 +28,7 @@ def again(folder: Path, owners: dict[str, keys.Owner], role: str, begin: datetim
 
 
 def identity(folder: Path, role: str, *, authority: Path | None = None) -> Identity:
-    """A role's files, unchecked."""
+    """The files of a role, without any check."""
     return Identity(
         role, (authority or folder) / "authority.pem", folder / f"{role}.pem", folder / f"{role}.key"
     )

@@ -41,7 +41,9 @@ def test_plain_python_computes_the_same_building() -> None:
     assert figure.met
 
 
-def test_the_peer_answers_through_whatever_it_prints(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_peer_interpreter_is_understood_whatever_it_prints_around_its_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     package = tmp_path / "openseespy"
     package.mkdir()
     (package / "__init__.py").write_text("")
@@ -55,7 +57,7 @@ def test_the_peer_answers_through_whatever_it_prints(tmp_path: Path, monkeypatch
     assert len(answer.at_once) == len(answer.by_step) == 2
 
 
-def test_a_peer_that_cannot_be_had_is_said_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_peer_that_cannot_be_started_is_reported_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(PYTHON, "/nowhere/python")
     answer = opensees_peer.ask(CASE)
     assert isinstance(answer, str)
@@ -65,7 +67,7 @@ def test_a_peer_that_cannot_be_had_is_said_with_its_reason(monkeypatch: pytest.M
     assert figure.best is None
 
 
-def test_the_reason_is_the_tracebacks_last_error() -> None:
+def test_the_reported_reason_is_the_last_error_of_the_traceback() -> None:
     trace = "Traceback\n  File\nModuleNotFoundError: No module named 'openseespy'\nProcess 0 Terminating\n"
     assert opensees_peer.reason(trace) == "No module named 'openseespy'"
     assert opensees_peer.reason("") == "it ended without an answer"

@@ -1,4 +1,4 @@
-"""What is recovered of damaged files, beside the MCAP library and its project's command."""
+"""How much is recovered from damaged files, compared with the MCAP library and its project's command."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from benchmarks.damaged_files import DAMAGES, WAYS, compare
 FRAMES_WHOLE = ("none", "cut off after two thirds", "footer missing", "a bit in a chunk")
 
 
-def test_no_other_way_recovers_more_and_where_the_frames_are_gone_all_recover_less(tmp_path: Path) -> None:
+def test_recovery_is_at_least_as_complete_as_other_tools_and_better_where_the_framing_is_lost(
+    tmp_path: Path,
+) -> None:
     shares = compare(tmp_path, ticks=600)
     assert list(shares) == list(DAMAGES)
     for name, (*others, ours) in shares.items():

@@ -1,4 +1,4 @@
-"""The benchmarks that wait for no clock, in their shortest form: each runs, and gives figures that JSON can hold."""
+"""The benchmarks that do not wait for a clock, in their shortest form: each gives figures that fit JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ IN_REAL_TIME = {"exchange", "real_time", "live", "start", "recorder"}  # tests/s
 
 
 def plain(figures: list[BenchmarkFigure]) -> list[dict[str, Any]]:
-    """What a benchmark writes, once it is shown that there are figures, each under a name of its own."""
+    """The figures as a benchmark writes them; fails where there are none or two share a name."""
     assert figures
     assert len({figure.name for figure in figures}) == len(figures)
     found: list[dict[str, Any]] = json.loads(
@@ -28,11 +28,11 @@ def plain(figures: list[BenchmarkFigure]) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("name", sorted(BENCHMARKS.keys() - IN_REAL_TIME - {"false_trips"}))
-def test_a_benchmark_runs(name: str) -> None:
+def test_a_benchmark_runs_and_gives_figures(name: str) -> None:
     assert any(figure["median"] is not None for figure in plain(BENCHMARKS[name](quick=True)))
 
 
-def test_false_trips_hold_what_must_hold() -> None:
+def test_false_trips_benchmark_reports_no_violation_and_plausible_gaps() -> None:
     figures = BENCHMARKS["false_trips"](quick=True)
     plain(figures)
     trips, _, *gaps = figures[:4]
@@ -41,7 +41,9 @@ def test_false_trips_hold_what_must_hold() -> None:
     assert all(gap.median is None or 0.0 < gap.median < 0.1 for gap in gaps)
 
 
-def test_a_test_that_ends_early_is_a_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_test_that_ends_early_counts_as_a_missed_target(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     early = ending(3, "t 0.1\nThe master was held up.\n\n", tmp_path / "none.mcap")
     assert early == Ending(3, "The master was held up.", None)
     (figure,) = plain([ended_early("any", [early])])
@@ -54,7 +56,7 @@ def test_a_test_that_ends_early_is_a_figure(tmp_path: Path, monkeypatch: pytest.
     assert not any(one["met"] for one in plain(live.run(quick=True)))
 
 
-def test_the_exchanges_start_is_one_that_the_slave_takes() -> None:
+def test_the_start_time_in_the_transport_benchmark_is_within_the_slaves_window() -> None:
     plan = transports.bench_plan("rths", Path("any"))
     assert plan.link.connect_timeout > transports.LEAD_S
     assert plan.window * plan.test.interval > transports.LEAD_S > SafetyTable().message_age

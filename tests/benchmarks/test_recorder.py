@@ -15,7 +15,7 @@ from common.signals import TICK_TOPICS
 WHOLE = Burst(1500.0, 1499.0, 1400.0, 3000, 0, 0, 0, 0, 0.2)
 
 
-def test_what_is_missing_and_what_is_double_is_counted() -> None:
+def test_missing_and_repeated_samples_are_counted() -> None:
     run = Run(Path("any"))
     run.sequences = {topic: np.arange(10) for topic in TICK_TOPICS}
     assert recorder.account(run, 10) == (0, 0)
@@ -24,14 +24,14 @@ def test_what_is_missing_and_what_is_double_is_counted() -> None:
     assert recorder.account(Run(Path("any")), 10) == (10 * len(TICK_TOPICS), 0)
 
 
-def test_a_recording_that_was_cut_off_reports_nothing() -> None:
+def test_a_recording_without_a_summary_reports_minus_one_lost_items() -> None:
     run = Run(Path("any"))
     assert recorder.reported(run) == -1
     run.metadata["summary"] = {"items_lost": "3", "items_dropped": "4"}
     assert recorder.reported(run) == 7
 
 
-def test_the_figures_name_the_fastest_whole_burst_and_the_first_loss() -> None:
+def test_the_figures_name_the_fastest_burst_without_loss_and_the_first_with_loss() -> None:
     faster = WHOLE._replace(offered=3000.0, sent_again=7)
     lossy = WHOLE._replace(offered=6000.0, missing=300)
     complete, easy, lost = recorder.figures([WHOLE, faster, lossy])

@@ -1,4 +1,4 @@
-"""The curves over storeys and tick rate: their buildings."""
+"""The buildings of the benchmark over the number of storeys and the tick rate."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ def test_one_storey_is_the_default_building() -> None:
 
 
 @pytest.mark.parametrize("storeys", [1, 3, 20])
-def test_a_uniform_building_vibrates_as_the_closed_form_has_it(storeys: int) -> None:
+def test_a_uniform_buildings_first_frequency_agrees_with_the_closed_form(storeys: int) -> None:
     assert scale.frequency_error(storeys) < scale.SAME
 
 
-def test_the_closed_form_is_the_textbooks_two_storeys() -> None:
+def test_the_closed_form_for_two_storeys_agrees_with_the_textbook() -> None:
     assert scale.first_frequency(2) ** 2 == pytest.approx((3.0 - 5.0**0.5) / 2.0)

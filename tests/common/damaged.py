@@ -1,4 +1,4 @@
-"""Recordings that are written and damaged, and what a whole chunk of them holds."""
+"""Writes recordings, damages them, and lists what each intact chunk holds."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ DEFAULTS: dict[FieldType, Any] = {
 
 
 def values(topic: str, seq: int, noise: random.Random) -> list[Any]:
-    """A message; with a generator of its own a file is the same whichever tests run before."""
+    """The values of a message; each file has its own random generator, so it does not depend on other tests."""
     return [seq, *(DEFAULTS.get(row.kind, noise.random()) for row in TOPICS[topic][1:])]
 
 
@@ -60,7 +60,7 @@ def write(path: Path, ticks: int = TICKS, *, close: bool = True, skip: range = r
 
 
 def spots(path: Path) -> list[Spot]:
-    """Every record outside chunks, with its place."""
+    """Every record outside chunks: its type, its first byte, the byte after it, and the record."""
     found: list[Spot] = []
     with path.open("rb") as stream:
         records = StreamReader(stream, emit_chunks=True).records
@@ -76,13 +76,13 @@ def spots(path: Path) -> list[Spot]:
 
 @cache
 def chunks_of(path: Path) -> list[tuple[bytes, set[Key]]]:
-    """Bytes of every chunk of an undamaged file, and its messages."""
+    """The bytes and the messages of every chunk of an undamaged file."""
     data = path.read_bytes()
     return [(data[spot[1] : spot[2]], set(keys(spot[3]))) for spot in spots(path) if spot[0] == "Chunk"]
 
 
 def whole_in(data: bytes, chunk: bytes) -> bool:
-    """Whether a chunk is there as it was written, whatever its times are."""
+    """Whether the data contain a chunk as it was written; its times are not compared."""
     place = data.find(chunk[TIMES.stop :]) - TIMES.stop
     return place >= 0 and data[place : place + TIMES.start] == chunk[: TIMES.start]
 

@@ -1,4 +1,4 @@
-"""An endpoint that hears what a test hands to it."""
+"""An endpoint that receives the frames which a test hands to it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FEEDBACK = Feedback(SESSION, 3, 2, 11, 2, 11, 12, 13, (0.001, 0.1, 0.002, 12.5))
 
 
 class Wire:
-    """Stands in for a link: what is heard is what a test hands to `hear`."""
+    """Stands in for a link: its frames are those that a test hands to `hear`."""
 
     def __init__(self) -> None:
         self.hear: Callable[[Packet], None] = lambda _: None
@@ -36,13 +36,13 @@ class Wire:
 
 
 class End(NamedTuple):
-    """An endpoint and the link it hears."""
+    """An endpoint and the link from which it receives."""
 
     endpoint: FrameEndpoint
     wire: Wire
 
     def hears(self, role: str, channel: str, frame: bytes, at: int = 1) -> Message | None:
-        """What the endpoint makes of a frame."""
+        """The message that the endpoint decodes from a frame, None where it rejects the frame."""
         self.wire.hear(Packet(role, channel, frame, at))
         received = self.endpoint.receive()
         return received.message if received else None

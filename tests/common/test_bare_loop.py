@@ -1,4 +1,4 @@
-"""The bare timing loop: its arithmetic, and as a process beside another."""
+"""The bare timing loop: its arithmetic, and its run as a process beside a test."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_missed_ticks_are_skipped_and_each_counts_with_its_own_lateness() -> Non
     assert values["p90"] == values["max"] == 5.5e-3
 
 
-def test_an_hour_of_sleep_costs_no_memory_and_no_time() -> None:
+def test_an_hour_of_missed_ticks_is_counted_in_one_step() -> None:
     lateness = Lateness(INTERVAL_NS)
     assert lateness.woke(3_600_000_000_000) == 1_800_001
     values = lateness.values()
@@ -70,7 +70,7 @@ def test_an_hour_of_sleep_costs_no_memory_and_no_time() -> None:
     assert values["p50"] == values["max"] == 3600.0
 
 
-def test_a_loop_beside_a_test_says_what_it_found() -> None:
+def test_a_loop_beside_a_test_returns_its_lateness_figures() -> None:
     loop = BareLoop()
     loop.start(INTERVAL_NS, NOTHING)
     pid = process_id(loop)
@@ -104,7 +104,7 @@ def test_a_stopped_process_skips_its_ticks_and_accounts_for_all_time() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="real-time scheduling is made for Linux here")
-def test_it_runs_above_the_process_it_watches_and_on_its_processor() -> None:
+def test_the_loop_runs_on_the_watched_processs_processor_at_a_higher_priority() -> None:
     try:
         policy = os.sched_getscheduler(0)
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
@@ -121,7 +121,7 @@ def test_it_runs_above_the_process_it_watches_and_on_its_processor() -> None:
     assert loop.stop()["priority"] == 11.0
 
 
-def test_it_ends_with_a_parent_that_is_killed() -> None:
+def test_the_loop_ends_when_its_parent_is_killed() -> None:
     text = (
         "import time; from common.host.bare_loop import BareLoop; from common.host.realtime import NOTHING;"
         "loop = BareLoop(); loop.start(2_000_000, NOTHING); print(loop._process.pid, flush=True); time.sleep(60)"
@@ -139,7 +139,7 @@ def test_it_ends_with_a_parent_that_is_killed() -> None:
     assert gone(pid)
 
 
-def test_a_loop_that_was_killed_or_hangs_or_never_started_gives_nothing(
+def test_a_loop_that_was_killed_hangs_or_never_started_gives_no_figures(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     loop = BareLoop()
@@ -157,7 +157,7 @@ def test_a_loop_that_was_killed_or_hangs_or_never_started_gives_nothing(
     assert loop.stop() == {}
 
 
-def test_it_runs_as_a_module_and_imports_next_to_nothing() -> None:
+def test_the_loop_runs_as_a_module_and_imports_few_modules() -> None:
     heavy = {"numpy", "typing", "subprocess", "asyncio"}
     text = f"import sys, common.host.bare_loop; print(sorted(set(sys.modules) & {heavy}))"
     environment = {"PYTHONPATH": str(ROOT)}

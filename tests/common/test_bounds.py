@@ -33,7 +33,7 @@ HURTING = {
 
 
 def followed(path: Path) -> None:
-    """Read as `rths live` does."""
+    """Reads a growing file as `rths live` does."""
     with Tail(path) as tail:
         tail.look()
 
@@ -46,7 +46,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
 
 
 def chunk(data: bytes) -> bytes:
-    """A chunk as the format has it."""
+    """A chunk record in the MCAP format."""
     packed = zstandard.compress(data)
     head = struct.pack("<QQQII", 0, 0, len(data), zlib.crc32(data), 4) + b"zstd"
     return HEAD.pack(6, len(head) + 8 + len(packed)) + head + struct.pack("<Q", len(packed)) + packed
@@ -54,7 +54,7 @@ def chunk(data: bytes) -> bytes:
 
 @pytest.fixture(scope="module")
 def hurting(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The files by name; equal chunks are packed once."""
+    """The files built to exhaust memory, by name; equal chunks are packed once."""
     folder, found = tmp_path_factory.mktemp("hurting"), {}
     for number, (name, (contents, _)) in enumerate(HURTING.items()):
         found[name] = folder / f"{number}.mcap"
@@ -64,7 +64,7 @@ def hurting(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("name", HURTING)
-def test_a_file_made_to_hurt_is_refused_early(
+def test_a_file_built_to_exhaust_memory_is_refused_early(
     name: str, reader: str, hurting: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
@@ -81,7 +81,7 @@ def test_a_file_made_to_hurt_is_refused_early(
 
 
 @pytest.mark.parametrize("storeys", [1, 1000])
-def test_a_building_at_rest_keeps_far_within_the_bounds(storeys: int, tmp_path: Path) -> None:
+def test_a_recording_of_a_building_at_rest_stays_far_below_the_bounds(storeys: int, tmp_path: Path) -> None:
     """Nothing packs better than what does not move: half of either bound is not reached, whatever the test's length."""
     path, ticks = tmp_path / "rest.mcap", 1500 if storeys == 1 else 200
     topics = {topic: TOPICS[topic] for topic in ("master", "slave", "latency")}
@@ -100,7 +100,7 @@ def test_a_building_at_rest_keeps_far_within_the_bounds(storeys: int, tmp_path: 
 
 
 def unpacked_size(path: Path) -> int:
-    """Bytes that the chunks of a file unpack to."""
+    """The number of bytes to which the chunks of a file unpack."""
     data, place, size = path.read_bytes(), len(MAGIC), 0
     while place < len(data) - len(MAGIC):
         opcode, length = HEAD.unpack_from(data, place)
@@ -109,7 +109,7 @@ def unpacked_size(path: Path) -> int:
     return size
 
 
-def test_a_short_file_may_hold_what_it_likes(tmp_path: Path) -> None:
+def test_the_ratio_bound_does_not_apply_to_a_short_file(tmp_path: Path) -> None:
     path = tmp_path / "short.mcap"
     path.write_bytes(MAGIC + chunk(EMPTY_MESSAGE * FREE_RECORDS))
     with pytest.raises(InputError, match="holds no topic"):
@@ -117,7 +117,7 @@ def test_a_short_file_may_hold_what_it_likes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("packing", ["", "lz4"])
-def test_what_other_programs_pack_is_read_and_recovered(packing: str, tmp_path: Path) -> None:
+def test_files_packed_by_other_programs_are_read_and_recovered(packing: str, tmp_path: Path) -> None:
     from mcap.reader import make_reader
     from mcap.writer import CompressionType, Writer
 

@@ -24,7 +24,7 @@ def plan() -> Plan:
     return parse(SERVO_PLAN, Path())
 
 
-def test_a_plan_with_all_of_it_survives_its_own_text(plan: Plan) -> None:
+def test_a_plan_with_every_building_key_survives_being_written_and_read(plan: Plan) -> None:
     again = parse(plan.toml(), Path())
     assert again == plan
     assert again.digest() == plan.digest()
@@ -91,7 +91,9 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG.keys())
-def test_what_does_not_fit_is_refused_with_a_sentence(text: str, message: str) -> None:
+def test_building_tables_that_do_not_fit_together_are_refused_with_one_sentence(
+    text: str, message: str
+) -> None:
     with pytest.raises(PlanError, match=message) as error:
         parse(text, Path(), "my.toml")
     assert str(error.value).startswith("my.toml")
@@ -119,14 +121,14 @@ CHOSEN = (
 
 
 @pytest.mark.parametrize("name", CHOSEN)
-def test_what_somebody_chose_has_no_tolerance(name: str) -> None:
+def test_a_parameter_without_an_effect_has_no_tolerance(name: str) -> None:
     text = "[structure.columns]\nmodel = 'bilinear'\nyield_displacement = 0.01\n"
     with pytest.raises(PlanError, match=f"Unknown parameter '{name}' in .tolerances."):
         parse(f"{text}[tolerances]\n'{name}' = 0.1\n", Path())
     parse(f"{text}[tolerances]\n'column.deformation_ratio' = 0.1\n'sensors.column_force' = 0.1\n", Path())
 
 
-def of_matrix(plan: Plan, stiffness: float, storey: int = 1) -> Plan:
+def with_substructured_stiffness(plan: Plan, stiffness: float, storey: int = 1) -> Plan:
     tables = plan.tables()
     tables["structure"]["experimental"]["stiffness"] = stiffness
     tables["column"]["storey"] = storey
@@ -134,20 +136,18 @@ def of_matrix(plan: Plan, stiffness: float, storey: int = 1) -> Plan:
 
 
 @pytest.mark.parametrize("storey", [1, 2, 3])
-def test_of_a_matrix_less_is_taken_over_than_the_storey_has_against_its_drift(
-    plan: Plan, storey: int
-) -> None:
+def test_the_specimens_share_is_below_the_drift_stiffness_of_its_storey(plan: Plan, storey: int) -> None:
     K, drift = np.array(plan.structure.stiffness), np.zeros(3)
     drift[max(storey - 2, 0)], drift[storey - 1] = -1.0, 1.0
     most = 1.0 / float(drift @ np.linalg.solve(K, drift))
-    of_matrix(plan, most * (1.0 - 1e-9), storey)
+    with_substructured_stiffness(plan, most * (1.0 - 1e-9), storey)
     with pytest.raises(PlanError, match=f"but the drift of storey {storey} of .*: give less than that"):
-        of_matrix(plan, most * (1.0 + 1e-9), storey)
+        with_substructured_stiffness(plan, most * (1.0 + 1e-9), storey)
 
 
-def test_of_the_benchmark_3_18_meganewtons_per_metre_can_be_taken_over(plan: Plan) -> None:
+def test_the_benchmarks_specimen_may_take_at_most_3_18_meganewtons_per_metre(plan: Plan) -> None:
     with pytest.raises(PlanError, match=r"has 3.1768e.06: give less"):
-        of_matrix(plan, 4e6)
+        with_substructured_stiffness(plan, 4e6)
 
 
 @given(
@@ -162,7 +162,9 @@ def test_positive_definite_is_what_the_eigenvalues_say(entries: list[float], val
         assert building.positive_definite(matrix.tolist()) is (least > 0.0)
 
 
-def test_a_reality_keeps_what_it_does_not_say_of_a_table_within_a_table(plan: Plan, tmp_path: Path) -> None:
+def test_a_reality_keeps_the_planned_values_of_nested_keys_that_it_does_not_give(
+    plan: Plan, tmp_path: Path
+) -> None:
     path = tmp_path / "secret.toml"
     path.write_text("[actuator.servo]\nleakage = 5.0\n[structure.experimental]\nmass = 20.0\n")
     found = reality.load(path, with_table(plan, "actuator", servo={"valve": 2.0e13})).plan
@@ -175,14 +177,14 @@ def truth(plan: Plan, text: str) -> Plan:
     return reality.from_reality(tomllib.loads(text), plan, Path()).plan
 
 
-def test_a_reality_cannot_leave_out_the_stiffness_of_a_table_that_the_plan_does_not_have(
+def test_a_reality_that_adds_a_table_must_give_its_stiffness(
     default_plan: Plan,
 ) -> None:
     with pytest.raises(PlanError, match=r"stiffness is missing in .structure.experimental."):
         truth(default_plan, "[structure.experimental]\nmass = 20.0\n")
 
 
-def test_a_reality_with_another_actuator_drops_the_parameters_of_the_planned_one(
+def test_a_reality_with_another_actuator_model_drops_the_planned_models_parameters(
     plan: Plan, default_plan: Plan
 ) -> None:
     planned = with_table(plan, "actuator", servo={"valve": 2.0e13})
@@ -203,9 +205,7 @@ def test_a_reality_with_another_actuator_drops_the_parameters_of_the_planned_one
         truth(planned, "[actuator]\nmodel = 'servo_hydraulic'\ngain = 1.1\n[column]\nmass = 9.0\n")
 
 
-def test_dashpots_and_a_damping_ratio_of_a_reality_stand_in_each_others_place(
-    plan: Plan, default_plan: Plan
-) -> None:
+def test_a_realitys_dashpots_replace_a_damping_ratio_and_the_reverse(plan: Plan, default_plan: Plan) -> None:
     def damping(planned: Plan, text: str) -> tuple[float, tuple[float, ...]]:
         found = truth(planned, f"[structure]\n{text}\n").structure
         return found.damping_ratio, found.damping
@@ -230,7 +230,7 @@ def test_an_ideal_plan_of_servo_hydraulics_survives_its_own_text(plan: Plan) -> 
     assert parse(made.toml(), Path()) == made
 
 
-def test_times_of_ticks_do_not_add_up_their_rounding(plan: Plan, default_plan: Plan) -> None:
+def test_the_times_of_ticks_do_not_accumulate_rounding(plan: Plan, default_plan: Plan) -> None:
     assert [plan.tick_ns(tick) for tick in (1, 2, 8, 4096)] == [244_141, 488_281, 1_953_125, 1_000_000_000]
     assert plan.tick_ns(4096 * 7200) == 7_200_000_000_000
     assert [default_plan.tick_ns(tick) for tick in (1, 3, 19_999)] == [2_000_000, 6_000_000, 39_998_000_000]

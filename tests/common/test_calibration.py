@@ -1,4 +1,4 @@
-"""What a plan says of a report and of the calibration of sensors."""
+"""The tables of a plan for the report and for the calibration of sensors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ date = 2026-05-01
 """
 
 
-def test_what_a_report_says_changes_no_test() -> None:
+def test_the_report_table_does_not_change_the_test_or_its_digest() -> None:
     plan = parse(TEXT, Path())
     assert plan.digest() == parse("", Path()).digest()
     assert changed(plan) == changed(Plan())
@@ -35,7 +35,7 @@ def test_what_a_report_says_changes_no_test() -> None:
     assert "[report]" not in Plan().toml()
 
 
-def test_calibrations_are_read_with_their_dates() -> None:
+def test_calibrations_of_sensors_are_read_with_their_dates() -> None:
     force, acceleration = calibrations(parse(TEXT, Path()))
     assert force == Calibration("column_force", date(2025, 5, 1), date(2026, 5, 1), "an institute", "F-2231")
     assert acceleration == Calibration("table_acceleration", date(2026, 5, 1))

@@ -88,7 +88,7 @@ def test_the_error_never_exceeds_the_bound(
 
 
 @given(st.integers(-(10**12), 10**12), EXCHANGES)
-def test_the_bound_is_never_wider_than_the_newest_round_trip_of_blocks_of_one(
+def test_the_bound_with_blocks_of_one_is_never_wider_than_the_newest_round_trip(
     offset: int, exchanges: list[tuple[int, ...]]
 ) -> None:
     clocks, estimate = Clocks(offset), ClockOffset(length=1)
@@ -99,13 +99,13 @@ def test_the_bound_is_never_wider_than_the_newest_round_trip_of_blocks_of_one(
         clocks.elapse(pause)
 
 
-def test_nothing_is_known_before_the_first_exchange() -> None:
+def test_the_estimate_is_zero_before_the_first_exchange() -> None:
     estimate = ClockOffset()
     assert (estimate.offset, estimate.bound, estimate.drift) == (0, 0, 0.0)
     assert (estimate.at(YEAR), estimate.bound_at(YEAR)) == (0, 0)
 
 
-def test_one_quick_exchange_is_enough() -> None:
+def test_one_fast_exchange_gives_a_tight_estimate() -> None:
     clocks, estimate = Clocks(S), ClockOffset()
     for there, back in ((900, 100), (50, 50), (700, 2000)):
         estimate.add(*clocks.exchange(there * US, 10, back * US))
@@ -113,7 +113,7 @@ def test_one_quick_exchange_is_enough() -> None:
     assert 50 * US <= estimate.bound < 51 * US
 
 
-def test_the_bound_grows_with_the_age_of_what_is_known() -> None:
+def test_the_bound_grows_with_the_age_of_the_newest_exchange() -> None:
     clocks, estimate = Clocks(S), ClockOffset()
     estimate.add(*clocks.exchange(50 * US, 0, 50 * US))
     assert estimate.bound_at(clocks.own + S) - estimate.bound == pytest.approx(200 * US, abs=2)
@@ -134,7 +134,7 @@ def test_a_drifting_clock_is_followed(ppm: int) -> None:
 
 @pytest.mark.parametrize("ways", [(50, 1), (1, 50)])
 @pytest.mark.parametrize("ppm", [0, 100])
-def test_a_congested_second_does_not_tilt_the_line(ways: tuple[int, int], ppm: int) -> None:
+def test_a_second_of_congestion_does_not_change_the_estimated_drift(ways: tuple[int, int], ppm: int) -> None:
     usual = scattered()
 
     def delays(t: int) -> tuple[int, int]:
@@ -159,7 +159,7 @@ def test_a_change_of_drift_is_followed_within_the_window() -> None:
     assert estimate.drift == pytest.approx(-50e-6, abs=10e-6)
 
 
-def test_an_asymmetry_shows_as_half_of_it_within_the_bound() -> None:
+def test_an_asymmetric_delay_gives_an_error_of_half_the_difference_within_the_bound() -> None:
     clocks, estimate = Clocks(S), ClockOffset()
     for _ in run(clocks, estimate, lambda _: (90 * US, 30 * US), ticks=2_000):
         assert clocks.error(estimate) == 30 * US
@@ -168,7 +168,7 @@ def test_an_asymmetry_shows_as_half_of_it_within_the_bound() -> None:
 
 
 @pytest.mark.parametrize("ppm", [0, 37])
-def test_large_stamps_lose_no_precision(ppm: int) -> None:
+def test_large_time_stamps_lose_no_precision(ppm: int) -> None:
     clocks = Clocks(0, ppm), Clocks(-YEAR // 2 - 1, ppm, YEAR + 7)
     estimates = ClockOffset(), ClockOffset()
     runs = [run(pair, each, scattered(), ticks=3_000) for pair, each in zip(clocks, estimates, strict=True)]
@@ -177,13 +177,13 @@ def test_large_stamps_lose_no_precision(ppm: int) -> None:
         assert abs(large - small + YEAR // 2 + 1) <= 2, t
 
 
-def test_equal_delays_of_nothing_give_the_offset_to_the_nanosecond() -> None:
+def test_exchanges_without_delay_give_the_offset_to_the_nanosecond() -> None:
     clocks, estimate = Clocks(S), ClockOffset()
     for _ in run(clocks, estimate, lambda _: (0, 0), ticks=1_000):
         assert clocks.error(estimate) == 0.0
 
 
-def test_a_clock_that_was_set_is_believed_at_once() -> None:
+def test_a_clock_that_is_set_anew_is_followed_at_once() -> None:
     clocks, estimate = Clocks(S, 20), ClockOffset()
     for _ in run(clocks, estimate, scattered(), ticks=1_000):
         pass
@@ -195,7 +195,7 @@ def test_a_clock_that_was_set_is_believed_at_once() -> None:
     assert abs(clocks.error(estimate)) < 15 * US
 
 
-def test_a_drift_beyond_the_assumed_one_is_followed_too() -> None:
+def test_a_drift_larger_than_the_assumed_one_is_followed() -> None:
     clocks, estimate = Clocks(S, 500), ClockOffset()
     for t in run(clocks, estimate, scattered(), ticks=5_000):
         if t > 2 * S:
@@ -204,7 +204,7 @@ def test_a_drift_beyond_the_assumed_one_is_followed_too() -> None:
     assert estimate.drift == pytest.approx(500e-6, abs=20e-6)
 
 
-def test_an_exchange_that_came_back_before_it_can_have_gone_there_says_nothing() -> None:
+def test_an_exchange_with_a_negative_round_trip_is_ignored() -> None:
     clock = ClockOffset(length=5, blocks=4)
     for k in range(40):
         late = 10**9 if k >= 20 else 0  # the other end's second stamp lies in the future

@@ -32,7 +32,7 @@ def messages_of(kind: type[Any]) -> st.SearchStrategy[Message]:
 
 @pytest.mark.parametrize("kind", MESSAGES, ids=lambda kind: kind.__name__)
 @given(data=st.data())
-def test_every_message_survives_the_wire(kind: type[Any], data: st.DataObject) -> None:
+def test_every_message_is_decoded_as_it_was_encoded(kind: type[Any], data: st.DataObject) -> None:
     message = data.draw(messages_of(kind))
     returned = decode(encode(message, KEY), KEY)
     assert type(returned) is kind
@@ -69,14 +69,14 @@ def framed(content: object, key: codec.Key = KEY) -> bytes:
         (None, "format"),
     ],
 )
-def test_what_is_no_message_is_rejected_with_its_reason(content: object, reason: str) -> None:
+def test_bytes_that_are_not_a_message_are_rejected_with_the_reason(content: object, reason: str) -> None:
     with pytest.raises(RejectedFrame) as rejection:
         decode(framed(content), KEY)
     assert rejection.value.reason.value == reason
 
 
 @pytest.mark.parametrize("channels", range(1, MOST_CHANNELS + 1))
-def test_a_feedback_has_a_layout_of_its_own_per_count_of_channels(channels: int) -> None:
+def test_a_feedback_has_its_own_layout_for_each_number_of_channels(channels: int) -> None:
     feedback = Feedback(7, 3, 2, 11, 2, 11, 12, 13, tuple(float(place) for place in range(channels)))
     frame = encode(feedback, KEY)
     assert len(frame) == 2 + 9 * (8 + channels) + codec.CHECK_SIZE
@@ -98,7 +98,7 @@ def test_two_messages_in_one_frame_are_rejected() -> None:
 
 
 @given(place=st.integers(0, 10_000), bit=st.integers(0, 7))
-def test_any_flipped_bit_is_noticed(place: int, bit: int) -> None:
+def test_any_flipped_bit_is_detected(place: int, bit: int) -> None:
     frame = bytearray(encode(COMMAND, KEY))
     frame[place % len(frame)] ^= 1 << bit
     with pytest.raises(RejectedFrame) as rejection:
@@ -107,13 +107,13 @@ def test_any_flipped_bit_is_noticed(place: int, bit: int) -> None:
 
 
 @given(st.binary(max_size=300))
-def test_noise_is_rejected(noise: bytes) -> None:
+def test_random_bytes_are_rejected(noise: bytes) -> None:
     with pytest.raises(RejectedFrame):
         decode(noise, KEY)
 
 
 @given(st.binary(max_size=300))
-def test_noise_with_a_valid_check_is_rejected_or_a_message(noise: bytes) -> None:
+def test_random_bytes_with_a_valid_checksum_are_rejected_or_decoded(noise: bytes) -> None:
     try:
         message = decode(noise + codec._check(KEY, noise), KEY)
     except RejectedFrame as rejection:
@@ -130,12 +130,12 @@ def test_another_session_or_plan_has_another_key() -> None:
         assert rejection.value.reason.value == "check"
 
 
-def test_before_a_session_all_understand_each_other() -> None:
+def test_before_a_session_the_key_does_not_depend_on_the_plan() -> None:
     register = Register(7, 1, "plan")
     assert decode(encode(register, session_key(0, "a")), session_key(0, "b")) == register
 
 
-def test_a_frame_each_way_stays_small() -> None:
+def test_frames_of_feedback_and_command_are_shorter_than_128_bytes() -> None:
     feedback = Feedback(2**62, 10**6, 10**6, 2**60, 10**6, 2**60, 2**60, 2**60, (0.1, 0.2, 0.3, 0.4))
     assert len(encode(feedback, KEY)) < 128
     assert len(encode(COMMAND._replace(session=2**62), KEY)) < 128

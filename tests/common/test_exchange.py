@@ -18,12 +18,12 @@ def reachable() -> set[State]:
     return found
 
 
-def test_every_state_is_in_the_table_and_reachable() -> None:
+def test_every_state_of_the_exchange_is_reachable() -> None:
     assert set(TRANSITIONS) == set(State)
     assert reachable() == set(State)
 
 
-def test_every_state_that_is_not_final_can_trip_be_lost_and_stop() -> None:
+def test_every_state_that_is_not_final_allows_trip_loss_and_stop() -> None:
     for state in set(State) - FINAL:
         assert TRANSITIONS[state][Event.TRIP] is State.TRIPPED
         assert TRANSITIONS[state][Event.LOSE] is State.LOST
@@ -31,7 +31,7 @@ def test_every_state_that_is_not_final_can_trip_be_lost_and_stop() -> None:
     assert {State.DONE, State.REFUSED, State.TRIPPED, State.LOST} == FINAL
 
 
-def test_the_normal_course_of_a_test() -> None:
+def test_the_states_of_a_completed_test_follow_in_order() -> None:
     exchange = Exchange()
     course = [Event.REGISTER, Event.ARM, Event.SCHEDULE, Event.RUN, Event.STOP, Event.FINISH]
     for event in course:
@@ -40,7 +40,7 @@ def test_the_normal_course_of_a_test() -> None:
     assert exchange.ended
 
 
-def test_an_error_says_whose_fault_it_is() -> None:
+def test_an_error_tells_a_local_from_a_remote_fault() -> None:
     with pytest.raises(LocalProtocolError, match="'run' is not allowed in the state 'idle'"):
         Exchange().happen(Event.RUN)
     with pytest.raises(RemoteProtocolError):
@@ -63,7 +63,7 @@ def test_the_first_cause_stays_and_final_states_are_latched(events: list[Event])
 
 
 @given(st.lists(st.integers(0, 50)))
-def test_only_frames_that_are_newer_than_all_before_are_fresh(seqs: list[int]) -> None:
+def test_a_frame_is_fresh_only_if_it_is_newer_than_all_before(seqs: list[int]) -> None:
     exchange = Exchange()
     newest = -1
     for seq in seqs:

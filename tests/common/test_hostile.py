@@ -1,4 +1,4 @@
-"""Hostile frames at the decoders: each is rejected for its reason and counted, and has no other effect."""
+"""Hostile frames are each rejected and counted with their reason, and have no other effect."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tests.helpers import ROOT
 
 
 def command(*fields: object) -> list[object]:
-    """The items of a command, the first ones as given."""
+    """The items of a command whose first ones are given."""
     return [codec.KINDS[Command], *fields, *list(COMMAND)[len(fields) :]]
 
 
@@ -156,7 +156,7 @@ def test_texts_are_bounded_and_printable(text: str, reason: str) -> None:
 
 @given(st.text() | st.text().map(lambda text: text * 200))
 @example("\ud800")
-def test_whatever_a_rig_says_its_message_arrives(text: str) -> None:
+def test_a_trip_with_any_text_of_a_rig_arrives_cut_to_the_longest_text(text: str) -> None:
     slave, master = end(), end()
     slave.endpoint.send(Trip(SESSION, SLAVE, "tripped", text))
     ((channel, frame),) = slave.wire.sent
@@ -165,7 +165,7 @@ def test_whatever_a_rig_says_its_message_arrives(text: str) -> None:
     assert len(message.text) == min(len(text), MOST_TEXT)
 
 
-def test_rejections_are_told_at_most_once_a_second_with_totals_and_what_is_new() -> None:
+def test_rejections_are_reported_at_most_once_a_second_with_totals_and_increments() -> None:
     found = Rejections()
     assert found.news(0) is None
     found.add(Reject.CHECK, "slave.roof", 5)
@@ -259,7 +259,7 @@ STRUCTURES = st.recursive(
 
 
 def is_message_or_rejected(frame: bytes) -> None:
-    """The one thing that decoding may do."""
+    """Decodes a payload, which must give a message or a rejection and raise nothing else."""
     try:
         message = decode(frame, KEY)
     except RejectedFrame as rejection:
@@ -271,23 +271,25 @@ def is_message_or_rejected(frame: bytes) -> None:
 
 
 @given(st.binary(max_size=400))
-def test_any_bytes_are_decoded_or_rejected(noise: bytes) -> None:
+def test_any_bytes_are_decoded_or_rejected_without_another_error(noise: bytes) -> None:
     is_message_or_rejected(noise)
     is_message_or_rejected(signed(noise))
 
 
 @given(STRUCTURES)
-def test_any_structure_under_the_right_key(content: object) -> None:
+def test_any_structure_under_the_right_key_is_decoded_or_rejected(content: object) -> None:
     is_message_or_rejected(framed(content))
 
 
 @given(st.integers(0, len(MESSAGES)), st.lists(PLAIN, max_size=14))
-def test_any_fields_under_a_known_kind(kind: int, fields: list[object]) -> None:
+def test_any_fields_of_a_known_message_kind_are_decoded_or_rejected(kind: int, fields: list[object]) -> None:
     is_message_or_rejected(framed([kind, *fields]))
 
 
 @given(ANY_MESSAGE, st.data())
-def test_a_valid_message_with_its_fields_exchanged(message: Message, data: st.DataObject) -> None:
+def test_a_valid_message_with_exchanged_fields_is_decoded_or_rejected(
+    message: Message, data: st.DataObject
+) -> None:
     items: list[object] = [codec.KINDS[type(message)], *message]
     place = data.draw(st.integers(0, len(items) - 1))
     items[place] = data.draw(STRUCTURES)
@@ -296,7 +298,9 @@ def test_a_valid_message_with_its_fields_exchanged(message: Message, data: st.Da
 
 
 @given(ANY_MESSAGE, st.data())
-def test_a_valid_message_flipped_cut_or_stuffed(message: Message, data: st.DataObject) -> None:
+def test_a_valid_message_that_is_flipped_cut_or_extended_is_decoded_or_rejected(
+    message: Message, data: st.DataObject
+) -> None:
     payload = bytearray(encode(message, KEY)[:-8])
     for _ in range(data.draw(st.integers(1, 4))):
         place = data.draw(st.integers(0, max(len(payload) - 1, 0)))
@@ -312,7 +316,7 @@ def test_a_valid_message_flipped_cut_or_stuffed(message: Message, data: st.DataO
     is_message_or_rejected(signed(bytes(payload)))
 
 
-def test_the_documentation_has_every_reason_once_in_the_order_of_the_enum() -> None:
+def test_the_documentation_lists_every_reason_for_rejection_once_in_the_order_of_the_enum() -> None:
     text = (ROOT / "docs" / "reference" / "rejections.md").read_text(encoding="utf-8")
     table, _, keys = text.partition("## Keys")
     assert re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE) == [reason.value for reason in Reject]

@@ -1,4 +1,4 @@
-"""Hostile files: plans and recordings that were not written by this program, or that a disk has damaged."""
+"""Plans and recordings that another program wrote or a disk damaged are read or refused in one sentence."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ VALUES = [
 @pytest.mark.parametrize(
     "text", ["a=" + "[" * 100_000, "a=" + "{a=" * 100_000, "[structure]\nmass=" + "[" * 2_000]
 )
-def test_a_plan_nested_without_end_is_one_sentence(text: str) -> None:
+def test_a_plan_with_extremely_deep_nesting_is_refused_in_one_sentence(text: str) -> None:
     with pytest.raises(PlanError, match="nested too deeply"):
         parse(text, Path())
 
 
 @given(st.data())
-def test_a_plan_with_any_values_is_a_plan_or_one_sentence(data: st.DataObject) -> None:
+def test_a_plan_with_any_values_is_read_or_refused_in_one_sentence(data: st.DataObject) -> None:
     lines = Plan().toml().split("\n")
     for _ in range(data.draw(st.integers(1, 3))):
         place = data.draw(st.integers(0, len(lines) - 1))
@@ -71,7 +71,7 @@ def recorded(path: Path) -> bytes:
 
 @settings(max_examples=100)
 @given(changes=st.lists(st.tuples(st.floats(0.0, 1.0), st.integers(0, 255), st.integers(-9, 9)), max_size=6))
-def test_a_recording_damaged_anywhere_is_read_up_to_there_or_refused(
+def test_a_damaged_recording_is_read_up_to_the_damage_or_refused(
     tmp_path_factory: pytest.TempPathFactory, changes: list[tuple[float, int, int]]
 ) -> None:
     path = tmp_path_factory.mktemp("damaged") / "a.mcap"
@@ -91,7 +91,9 @@ def test_a_recording_damaged_anywhere_is_read_up_to_there_or_refused(
 
 
 @pytest.mark.parametrize("declared", [0, RECORD_LIMIT + 1])
-def test_a_chunk_that_unpacks_without_measure_is_not_unpacked(declared: int, tmp_path: Path) -> None:
+def test_a_chunk_that_would_unpack_to_an_excessive_size_is_not_unpacked(
+    declared: int, tmp_path: Path
+) -> None:
     bomb = zstandard.compress(bytes(RECORD_LIMIT + 1))
     chunk = struct.pack("<QQQII", 0, 0, declared, 0, 4) + b"zstd" + struct.pack("<Q", len(bomb)) + bomb
     path = tmp_path / "bomb.mcap"

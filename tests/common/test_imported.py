@@ -1,4 +1,4 @@
-"""What an imported recording states of its channels: written, read back, and what it does to a prediction."""
+"""The statements of an imported recording about its channels: written, read, and applied to a prediction."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ LOW_PASS = LoggerFilter("butterworth", 4, 100.0)
 FORCE = ImportedChannel(LOW_PASS, 0.004, 1.0, 0.01, interpolated=True, rate=1024.0)
 
 
-def of(metadata: dict[str, dict[str, str]]) -> Run:
+def run_with_metadata(metadata: dict[str, dict[str, str]]) -> Run:
     return Run(Path("a.mcap"), metadata=metadata)
 
 
 def test_what_is_written_is_read_back() -> None:
     stated = ImportedData("a.csv", True, {"master": {"column_force": FORCE}})
-    found = imported(of({IMPORT: stated.metadata()}))
+    found = imported(run_with_metadata({IMPORT: stated.metadata()}))
     assert found == stated
     assert found.channel("master", "column_force") == FORCE
     assert found.channel("slave", "damper_force") == NOTHING_STATED
 
 
-def test_a_test_of_rths_is_no_import_and_an_older_import_states_nothing() -> None:
-    assert imported(of({})) is None
-    older = imported(of({IMPORT: {"data": "b.csv"}}))
+def test_a_recording_of_rths_is_no_import_and_an_older_import_states_no_channels() -> None:
+    assert imported(run_with_metadata({})) is None
+    older = imported(run_with_metadata({IMPORT: {"data": "b.csv"}}))
     assert older == ImportedData("b.csv")
     with pytest.raises(InputError, match="its metadata 'import' cannot be read"):
-        imported(of({IMPORT: {"channels": '{"master": {"x": {"colour": 1}}}'}}))
+        imported(run_with_metadata({IMPORT: {"channels": '{"master": {"x": {"colour": 1}}}'}}))
 
 
 @pytest.mark.parametrize("kind", ["butterworth", "bessel"])
-def test_a_filter_loses_three_decibels_at_its_cutoff_and_delays_what_is_slow(kind: str) -> None:
+def test_a_filter_attenuates_3_db_at_its_cutoff_and_delays_slow_motion(kind: str) -> None:
     low_pass = LoggerFilter(kind, 4, 50.0)
     assert abs(low_pass.response(np.array([50.0]))[0]) == pytest.approx(math.sqrt(0.5), rel=1e-6)
     t = np.arange(2000) * 0.001
@@ -55,7 +55,7 @@ def test_a_filter_loses_three_decibels_at_its_cutoff_and_delays_what_is_slow(kin
     assert np.max(np.abs(low_pass.filtered(slow, 0.001) - expected)[500:]) < 1e-3
 
 
-def test_a_prediction_passes_filter_and_delay() -> None:
+def test_a_prediction_passes_through_the_stated_filter_and_delay() -> None:
     t = np.arange(1000) * 0.002
     ramp = np.asarray(3.0 * t, dtype=np.float64)
     seen = FORCE.through(ramp, 0.002)
@@ -64,7 +64,7 @@ def test_a_prediction_passes_filter_and_delay() -> None:
     assert NOTHING_STATED.through(ramp, 0.002) is ramp
 
 
-def test_a_channel_is_late_by_its_delay_and_by_what_its_filter_delays_slow_motion() -> None:
+def test_a_channels_lateness_is_its_delay_plus_its_filters_delay_of_slow_motion() -> None:
     passed = LoggerFilter("butterworth", 2, 50.0)
     assert ImportedChannel(delay=0.002).late == pytest.approx(0.002)
     assert ImportedChannel(passed, 0.002).late == pytest.approx(
@@ -72,7 +72,7 @@ def test_a_channel_is_late_by_its_delay_and_by_what_its_filter_delays_slow_motio
     )
 
 
-def test_the_exchange_is_known_by_numbers_or_stamps() -> None:
+def test_an_import_states_the_exchange_by_sequence_numbers_or_time_stamps() -> None:
     numbers = Run(Path("a.mcap"), columns={"master": {"damper_force_seq": np.zeros(3)}})
     stamps = Run(Path("a.mcap"), columns={"latency": {"command_one_way": np.zeros(3)}})
     neither = Run(Path("a.mcap"), columns={"slave": {"seq": np.zeros(3), "damper_force": np.zeros(3)}})

@@ -14,7 +14,7 @@ def packet(number: int) -> Packet:
     return Packet("master", "tick", b"", number)
 
 
-def test_frames_come_in_order_and_none_is_waited_for_too_long() -> None:
+def test_frames_come_in_order_and_a_missing_one_is_awaited_for_a_bounded_time() -> None:
     inbox: Inbox[Packet] = Inbox()
     for number in range(3):
         inbox.put(packet(number))
@@ -54,7 +54,7 @@ def test_nothing_is_lost_between_several_producers_and_a_consumer() -> None:
     assert not any(producer.is_alive() for producer in producers)
 
 
-def test_a_signal_does_not_make_it_wait_for_ever() -> None:
+def test_a_signal_handler_does_not_prolong_the_wait() -> None:
     inbox: Inbox[Packet] = Inbox()
     before = signal.signal(signal.SIGUSR1, lambda *_: time.sleep(0.2))
     try:

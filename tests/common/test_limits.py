@@ -23,7 +23,7 @@ from common.plan.limits import LimitViolation
         ),
     ],
 )
-def test_a_violation_is_a_sentence_with_the_unit_of_the_plan(
+def test_a_violated_limit_is_one_sentence_with_the_unit_of_the_plan(
     violation: LimitViolation, sentence: str
 ) -> None:
     assert str(violation) == violation.sentence == sentence

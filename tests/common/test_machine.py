@@ -23,7 +23,7 @@ intr 12345
 
 @pytest.fixture
 def kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A kernel whose files are empty so far."""
+    """The files of a made-up kernel, which are empty at first."""
     monkeypatch.setattr(machine, "PROC", tmp_path / "proc")
     monkeypatch.setattr(machine, "SYS", tmp_path / "sys")
     monkeypatch.setattr(machine, "CGROUPS", tmp_path / "sys/fs/cgroup")
@@ -35,7 +35,7 @@ def write(root: Path, name: str, text: str) -> None:
     (root / name).write_text(text)
 
 
-def test_the_real_kernel_gives_numbers_that_can_be() -> None:
+def test_the_real_kernel_gives_plausible_numbers() -> None:
     watch = machine.Watch()
     time.sleep(0.05)
     values = watch.values()
@@ -61,7 +61,7 @@ def test_stolen_and_busy_time_are_shares_of_all_processors(kernel: Path) -> None
     assert values["busy_share"] == pytest.approx(10 * unit / (2 * values["seconds"]))
 
 
-def test_what_the_kernel_does_not_offer_is_left_out(kernel: Path) -> None:
+def test_figures_that_the_kernel_does_not_offer_are_left_out(kernel: Path) -> None:
     values = machine.Watch().values()
     assert not {"stolen_share", "busy_share", "waiting_s", "throttled_s"} & set(values)
     assert values["major_faults"] >= 0.0
@@ -77,7 +77,7 @@ def test_what_the_kernel_does_not_offer_is_left_out(kernel: Path) -> None:
         ("0::/../elsewhere\n", "sys/fs/cgroup", "throttled_usec 2500000"),
     ],
 )
-def test_a_quota_is_found_in_either_version_and_above(
+def test_a_processor_quota_is_found_in_both_cgroup_versions_and_in_parent_groups(
     kernel: Path, cgroup: str, folder: str, unit: str
 ) -> None:
     write(kernel, "proc/self/cgroup", cgroup)
@@ -86,7 +86,7 @@ def test_a_quota_is_found_in_either_version_and_above(
     assert machine.throttling() == {"throttled": 3.0, "throttled_s": 2.5}
 
 
-def test_pressure_is_the_time_that_some_task_waited(kernel: Path) -> None:
+def test_pressure_is_the_time_for_which_some_task_waited(kernel: Path) -> None:
     write(kernel, "proc/pressure/cpu", "some avg10=0.45 avg60=0.46 avg300=1.85 total=3500000\nfull total=0\n")
     assert machine.pressure() == {"waiting_s": 3.5}
 
@@ -110,7 +110,7 @@ def test_spare_memory_is_the_least_of_host_and_control_groups(kernel: Path) -> N
         ("", "#1 SMP", ""),
     ],
 )
-def test_a_kernel_for_real_time_is_told_from_others(
+def test_a_real_time_kernel_is_recognized(
     kernel: Path, monkeypatch: pytest.MonkeyPatch, realtime: str, version: str, expected: str
 ) -> None:
     write(kernel, "sys/kernel/realtime", realtime)

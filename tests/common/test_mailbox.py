@@ -11,7 +11,7 @@ DT = 0.002
 
 
 class Fates:
-    """A link whose extra delays are given, one per message."""
+    """A link with a given extra delay for each message."""
 
     def __init__(self, delays: list[float | None]) -> None:
         self.delays = delays
@@ -30,7 +30,7 @@ def test_on_a_perfect_link_a_message_is_used_at_its_nominal_tick() -> None:
     assert box.take(2) is None
 
 
-def test_a_whole_interval_of_delay_is_a_whole_tick() -> None:
+def test_a_delay_of_one_interval_is_one_tick() -> None:
     box: Mailbox[str] = Mailbox(Fates([DT, 0.0]), "feedback", DT, nominal=0)
     box.put(0, "a")
     assert box.take(0) is None
@@ -38,7 +38,7 @@ def test_a_whole_interval_of_delay_is_a_whole_tick() -> None:
 
 
 @given(st.lists(st.one_of(st.none(), st.floats(0.0, 0.02)), min_size=1, max_size=40))
-def test_each_tick_uses_the_newest_message_that_is_there(delays: list[float | None]) -> None:
+def test_each_tick_uses_the_newest_message_that_has_arrived(delays: list[float | None]) -> None:
     box: Mailbox[int] = Mailbox(Fates(delays), "feedback", DT, nominal=1)
     used, expected = -1, -1
     for tick in range(len(delays) + 12):
@@ -52,7 +52,7 @@ def test_each_tick_uses_the_newest_message_that_is_there(delays: list[float | No
         assert used == expected
 
 
-def test_what_comes_from_the_wire_is_seen_even_where_the_link_loses_it() -> None:
+def test_a_message_that_the_emulated_link_loses_still_counts_as_received_from_the_wire() -> None:
     box: Mailbox[str] = Mailbox(Fates([None]), "feedback", DT, nominal=1)
     box.put(0, "a")
     assert box.newest_seen == 0

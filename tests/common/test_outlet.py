@@ -32,7 +32,7 @@ def numbers(items: list[Item]) -> list[int]:
 
 
 @given(st.integers(0, 200), st.randoms(use_true_random=False), st.floats(0.0, 0.9))
-def test_whatever_is_lost_swapped_or_repeated_the_stream_comes_whole_and_in_order(
+def test_the_stream_is_complete_and_in_order_whatever_is_lost_swapped_or_repeated(
     count: int, random: Any, loss: float
 ) -> None:
     outlet, pieces = filled(count)
@@ -53,7 +53,7 @@ def test_whatever_is_lost_swapped_or_repeated_the_stream_comes_whole_and_in_orde
     assert inlet.lost == 0
 
 
-def test_pieces_leave_when_they_are_full() -> None:
+def test_pieces_are_sent_when_they_are_full() -> None:
     outlet = Outlet(1, "slave", math.inf, ROWS)
     for number in range(PIECE - 1):
         outlet.add("slave", (0, 0, number))
@@ -62,7 +62,7 @@ def test_pieces_leave_when_they_are_full() -> None:
     assert len(outlet.pieces()) == 1
 
 
-def test_a_hole_that_nobody_can_fill_is_counted() -> None:
+def test_a_gap_that_cannot_be_filled_is_counted() -> None:
     outlet, pieces = filled(3 * PIECE)
     inlet = Inlet()
     got = inlet.take(pieces[0]) + inlet.take(pieces[2])
@@ -74,7 +74,7 @@ def test_a_hole_that_nobody_can_fill_is_counted() -> None:
     assert inlet.complete
 
 
-def test_a_missing_end_is_noticed_once_the_length_is_known() -> None:
+def test_a_missing_end_is_detected_once_the_length_is_known() -> None:
     outlet, pieces = filled(2 * PIECE)
     inlet = Inlet()
     inlet.take(pieces[0])
@@ -84,7 +84,7 @@ def test_a_missing_end_is_noticed_once_the_length_is_known() -> None:
     assert not inlet.complete
 
 
-def test_a_laboratory_sends_a_bounded_number_of_pieces_again_at_once() -> None:
+def test_a_laboratory_resends_a_bounded_number_of_pieces_at_once() -> None:
     outlet, pieces = filled(100 * PIECE)
     assert outlet.again(Resend(1, "master", 0, outlet.total - 1)) == pieces[:BURST]
     assert outlet.again(Resend(1, "master", 3 * PIECE, 4 * PIECE - 1)) == [pieces[3]]
@@ -93,27 +93,27 @@ def test_a_laboratory_sends_a_bounded_number_of_pieces_again_at_once() -> None:
         assert outlet.again(Resend(1, "master", first, last)) == []
 
 
-def test_what_is_no_longer_kept_is_not_sent_and_what_follows_it_is() -> None:
+def test_a_resend_leaves_out_discarded_pieces_and_sends_the_later_ones() -> None:
     outlet, pieces = filled(103 * PIECE, kept=99 * PIECE)
     assert outlet.again(Resend(1, "master", 0, outlet.total - 1)) == pieces[3 : 3 + BURST]
     assert outlet.again(Resend(1, "master", 0, 3 * PIECE - 1)) == []
 
 
 @given(st.integers(1, 500), st.integers(1, 300))
-def test_the_newest_items_are_kept_and_hardly_more(count: int, kept: int) -> None:
+def test_only_about_the_requested_number_of_newest_items_is_kept(count: int, kept: int) -> None:
     outlet, _ = filled(count, kept)
     again = [item for item in range(count) if outlet.again(Resend(1, "master", item, item))]
     assert again == list(range(count - len(again), count))
     assert min(count, kept) <= len(again) < kept + 2 * PIECE
 
 
-def test_what_is_kept_is_bounded_in_bytes_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_kept_items_are_bounded_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outlet, "KEPT_BYTES", 5_000)
     sender, _ = filled(1_000 * PIECE)
     assert 4_000 < sum(len(piece.items) for piece in sender._sent) == sender._sent_bytes <= 5_000
 
 
-def test_all_laboratories_keep_the_same_time_of_a_test(default_plan: Plan) -> None:
+def test_all_laboratories_keep_items_for_the_same_time_span(default_plan: Plan) -> None:
     ticks = 60.0 / default_plan.test.interval
     assert kept_items(default_plan, "slave") == pytest.approx(ticks)
     assert kept_items(default_plan, "master") == pytest.approx(2 * ticks)  # and its latency
@@ -121,7 +121,7 @@ def test_all_laboratories_keep_the_same_time_of_a_test(default_plan: Plan) -> No
     assert kept_items(hasty, "slave") == pytest.approx(PATIENCES * 1.5 / default_plan.test.interval)
 
 
-def test_all_holes_are_known_at_once() -> None:
+def test_all_gaps_are_listed_at_once() -> None:
     outlet, pieces = filled(9 * PIECE)
     inlet = Inlet()
     for place in (0, 2, 3, 6):

@@ -12,7 +12,7 @@ from common.errors import InputError
 from common.terminal import outputs
 
 
-def test_a_file_takes_its_name_when_it_is_whole(tmp_path: Path) -> None:
+def test_an_output_file_takes_its_name_when_it_is_complete(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     with outputs.writing(path) as temporary:
         assert temporary.suffix == ".csv"
@@ -25,7 +25,7 @@ def test_a_file_takes_its_name_when_it_is_whole(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_after_an_error_nothing_is_left_and_what_was_there_stays(tmp_path: Path) -> None:
+def test_after_an_error_no_partial_file_remains_and_an_existing_file_is_unchanged(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     with pytest.raises(ZeroDivisionError), outputs.writing(path):
         raise ZeroDivisionError
@@ -36,7 +36,7 @@ def test_after_an_error_nothing_is_left_and_what_was_there_stays(tmp_path: Path)
     assert path.read_text() == "before"
 
 
-def test_only_force_replaces(tmp_path: Path) -> None:
+def test_an_existing_file_is_replaced_only_with_force(tmp_path: Path) -> None:
     path, link, astray = tmp_path / "a", tmp_path / "link", tmp_path / "astray"
     path.write_text("")  # an empty file is a file
     link.symlink_to(path)
@@ -49,7 +49,7 @@ def test_only_force_replaces(tmp_path: Path) -> None:
     assert link.is_symlink()
 
 
-def test_what_a_command_reads_is_never_its_output(tmp_path: Path) -> None:
+def test_a_commands_input_file_is_never_its_output(tmp_path: Path) -> None:
     path, link = tmp_path / "a", tmp_path / "link"
     path.write_text("measured")
     link.hardlink_to(path)
@@ -57,7 +57,7 @@ def test_what_a_command_reads_is_never_its_output(tmp_path: Path) -> None:
         outputs.checked(link, True, [path])
 
 
-def test_where_nothing_can_be_written_it_is_said_before_any_work(tmp_path: Path) -> None:
+def test_an_unwritable_output_is_reported_before_any_work(tmp_path: Path) -> None:
     for path, sentence in (
         (tmp_path, "is a folder"),
         (tmp_path / "no" / "a", "There is no folder"),
@@ -68,7 +68,7 @@ def test_where_nothing_can_be_written_it_is_said_before_any_work(tmp_path: Path)
             pass
 
 
-def test_of_two_commands_one_gets_the_name(tmp_path: Path) -> None:
+def test_only_one_of_two_concurrent_commands_gets_the_output_name(tmp_path: Path) -> None:
     path, both, told = tmp_path / "a", threading.Barrier(2), []
 
     def write(text: str) -> None:
@@ -89,7 +89,9 @@ def test_of_two_commands_one_gets_the_name(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_stream_gets_the_whole_or_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_pipe_receives_the_complete_output_or_nothing(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     outputs.write_text(Path("/dev/stdout"), "to the pipe")
     with pytest.raises(ZeroDivisionError), outputs.writing(Path("/dev/stdout")) as temporary:
         temporary.write_text(f"half {1 / 0}")
@@ -116,7 +118,7 @@ def test_a_recording_has_its_name_from_the_beginning(tmp_path: Path) -> None:
     assert path.read_text() == "recorded"
 
 
-def test_a_folder_is_new_or_empty(tmp_path: Path) -> None:
+def test_an_output_folder_must_be_new_or_empty(tmp_path: Path) -> None:
     folder = tmp_path / "deep" / "new"
     with pytest.raises(ZeroDivisionError), outputs.folder(folder):
         raise ZeroDivisionError

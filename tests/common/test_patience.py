@@ -1,4 +1,4 @@
-"""Figures of a test whose laboratories are all emulated: derived from the plan alone, strict again beside a rig."""
+"""Limits of a test whose laboratories are all emulated follow from the plan and are strict with a rig."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ HERE = Path()
 
 
 @pytest.mark.parametrize("name", cli.SHIPPED)
-def test_shipped_plans_bear_pauses_and_are_strict_beside_a_rig(name: str) -> None:
+def test_shipped_plans_tolerate_pauses_and_are_strict_with_a_rig(name: str) -> None:
     shipped = plans.load(cli.plan_path(name))
     assert {OVERRUN, "safety.ramp_after", "safety.hold_after"} <= set(shipped.eased)
     interval, safety = shipped.test.interval, shipped.safety
@@ -57,7 +57,7 @@ def test_limits_are_larger_for_the_kinds_that_slaves_host(name: str, kinds: set[
     ]
 
 
-def test_the_sentence_says_that_limits_of_a_kind_of_ones_own_do_not_hold() -> None:
+def test_the_message_says_that_limits_of_a_users_kind_are_not_checked() -> None:
     said = patience.sentence(parse('[slave]\nkind = "lab.py:Lab"\n', HERE))
     assert "Limits of a kind of your own on the rates of its command are not checked." in said
     assert "actuator" not in said
@@ -65,14 +65,14 @@ def test_the_sentence_says_that_limits_of_a_kind_of_ones_own_do_not_hold() -> No
 
 
 @pytest.mark.parametrize("whose", RIGS)
-def test_beside_a_rig_of_the_users_every_figure_is_strict(whose: str) -> None:
+def test_with_a_rig_of_the_user_every_limit_is_strict(whose: str) -> None:
     planned = parse(RIGS[whose], HERE)
     assert planned.eased == ()
     assert (planned.safety, planned.limits, planned.link) == (Plan().safety, Plan().limits, Plan().link)
     assert not planned.makes_good
 
 
-def test_a_reality_changes_no_figure(tmp_path: Path) -> None:
+def test_a_reality_changes_no_limit(tmp_path: Path) -> None:
     planned = parse("", HERE)
     hidden = reality.from_reality({"master": {"rig": {"class": "lab.py:Lab"}}}, planned, tmp_path)
     assert hidden.plan.safety == planned.safety
@@ -92,32 +92,32 @@ def test_a_reality_changes_no_figure(tmp_path: Path) -> None:
         ("[limits]\ndamper_stroke = 0.4", "limits.damper_stroke", 0.4),
     ],
 )
-def test_what_is_written_out_holds_as_written(text: str, name: str, value: float) -> None:
+def test_a_limit_that_the_plan_gives_is_used_as_given(text: str, name: str, value: float) -> None:
     planned = parse(text, HERE)
     assert patience.figure(planned, name) == value
     assert name not in planned.eased
     assert planned.eased  # the others are patient all the same
 
 
-def test_late_ticks_are_made_good_unless_overrun_is_written_out() -> None:
+def test_late_ticks_are_made_up_unless_the_plan_gives_overrun() -> None:
     assert parse("", HERE).makes_good
     assert not parse("[safety]\noverrun = 5", HERE).makes_good
     assert not Plan().makes_good
 
 
 @pytest.mark.parametrize("interval", [1e-4, 0.002, 0.1])
-def test_figures_in_intervals_follow_the_interval(interval: float) -> None:
+def test_limits_that_are_counted_in_intervals_follow_the_interval(interval: float) -> None:
     planned = parse(f"[test]\ninterval = {interval}", HERE)
     assert planned.safety.overrun == math.ceil(patience.PATIENCE / interval - 1e-9)
     assert Plan().safety.hold_after <= planned.safety.hold_after < planned.safety.ramp_after
 
 
-def test_hold_after_written_beyond_the_strict_ramp_after_is_refused() -> None:
+def test_a_given_hold_after_above_the_strict_ramp_after_is_refused() -> None:
     with pytest.raises(PlanError, match="hold_after in .safety. is 10"):
         parse("[safety]\nhold_after = 10", HERE)
 
 
-def test_every_process_derives_the_same_and_the_recordings_plan_too() -> None:
+def test_every_process_and_the_recorded_plan_give_the_same_limits() -> None:
     planned = parse("[test]\nduration = 4.0\n[preflight]\nexchanges = 500\n", HERE)
     again = parse(planned.toml(), HERE)
     assert (again, again.eased, again.digest()) == (planned, planned.eased, planned.digest())
@@ -129,7 +129,7 @@ def test_every_process_derives_the_same_and_the_recordings_plan_too() -> None:
     assert from_tables(written, HERE).safety == Plan().safety
 
 
-def test_the_sentence_names_every_figure_beside_the_strict_one() -> None:
+def test_the_message_names_every_limit_with_its_strict_value() -> None:
     planned = parse("", HERE)
     said = patience.sentence(planned)
     assert "overrun 1000 (5)" in said
@@ -137,11 +137,11 @@ def test_the_sentence_names_every_figure_beside_the_strict_one() -> None:
     assert all(name.partition(".")[2] in said for name in planned.eased)
 
 
-def test_of_an_emulation_nothing_lacks() -> None:
+def test_a_test_without_a_rig_does_not_report_what_the_machine_lacks() -> None:
     assert lacking.lacks(parse("", HERE), NOTHING._replace(missing=("No real-time priority.",))) == []
 
 
-def test_beside_a_rig_it_is_said_what_the_machine_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_test_with_a_rig_reports_what_the_machine_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
     found = {"ticks": 470.0, "late": 30.0, "max": 0.019}
     monkeypatch.setattr(BareLoop, "start", lambda *_: None)
     monkeypatch.setattr(BareLoop, "stop", lambda _: found)

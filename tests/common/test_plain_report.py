@@ -1,4 +1,4 @@
-"""What a process of a test says on standard error while it waits, runs and ends."""
+"""The lines of a test's process on standard error while it waits, runs and ends."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from common.terminal import cli
 from common.terminal.plain_report import PlainReport
 
 
-def test_progress_is_a_line_now_and_then_without_numbers_that_are_none(capsys: Any) -> None:
+def test_progress_is_printed_periodically_with_a_dash_for_missing_numbers(capsys: Any) -> None:
     report = PlainReport(40.0)
     for tick in range(0, 3_500, 100):
         data = {
@@ -31,7 +31,7 @@ def test_progress_is_a_line_now_and_then_without_numbers_that_are_none(capsys: A
     ]
 
 
-def test_an_error_is_said_once(capsys: Any) -> None:
+def test_an_error_is_printed_once(capsys: Any) -> None:
     report = PlainReport(40.0)
 
     def main() -> int:
@@ -45,7 +45,7 @@ def test_an_error_is_said_once(capsys: Any) -> None:
     assert not raised.value.said
 
 
-def test_who_is_waited_for_is_said_once_in_a_while() -> None:
+def test_the_awaited_peer_is_named_periodically() -> None:
     waited = Waited(0)
     said = [waited.news("slave and recorder", 30.0, second * 10**9) for second in range(26)]
     assert [text for text in said if text] == [
@@ -56,7 +56,7 @@ def test_who_is_waited_for_is_said_once_in_a_while() -> None:
     assert waited.news("slave", 30.0, 100 * SAY_NS + 1) == ""
 
 
-def test_a_completed_test_has_one_word_everywhere() -> None:
+def test_an_outcome_is_shown_as_one_word_or_cut_off() -> None:
     assert outcome({"outcome": "stop", "cause": "completed"}) == "completed"
     assert outcome({"outcome": "limit"}) == "limit"
     assert outcome({}) == "cut off"

@@ -16,17 +16,17 @@ from common.reality import reality
 from common.terminal import cli
 
 
-def test_the_shipped_default_plan_is_what_a_plan_is_by_default(default_plan: Plan) -> None:
+def test_the_shipped_default_plan_equals_a_plan_of_defaults(default_plan: Plan) -> None:
     assert default_plan.tables() == Plan().tables()
 
 
-def test_the_paper_differs_in_name_and_lead_only(default_plan: Plan) -> None:
+def test_the_paper_plan_differs_from_the_default_in_name_and_lead_only(default_plan: Plan) -> None:
     tables = strict(plans.load(cli.plan_path("paper"))).tables()
     tables["test"]["name"], tables["compensator"]["lead"] = "default", 0.044
     assert tables == default_plan.tables()
 
 
-def test_the_default_test_is_the_contracts(default_plan: Plan) -> None:
+def test_the_default_plan_has_the_specified_values(default_plan: Plan) -> None:
     assert default_plan.ticks == 20_000
     assert default_plan.structure.mass == (160_000.0,)
     assert default_plan.structure.stiffness == (25e6,)
@@ -88,7 +88,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("text_and_message", WRONG.values(), ids=WRONG.keys())
-def test_a_wrong_plan_is_refused_with_a_sentence(text_and_message: tuple[str, str | None]) -> None:
+def test_a_wrong_plan_is_refused_in_one_sentence(text_and_message: tuple[str, str | None]) -> None:
     text, message = text_and_message
     if message is None:
         assert parse(text, Path()).column.parameters == {"stifness": 1.0}  # the model's registry refuses it
@@ -99,7 +99,7 @@ def test_a_wrong_plan_is_refused_with_a_sentence(text_and_message: tuple[str, st
     assert "\n" not in str(error.value)
 
 
-def test_a_plan_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+def test_a_message_about_an_unreadable_plan_names_the_file(tmp_path: Path) -> None:
     with pytest.raises(PlanError, match=r"missing.toml: No such file"):
         plans.load(tmp_path / "missing.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
@@ -113,7 +113,7 @@ def test_a_plan_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     mass=st.lists(st.floats(1.0, 1e9), min_size=1, max_size=5),
     frequency=st.one_of(st.just(math.inf), st.floats(0.1, 1e3)),
 )
-def test_a_plan_survives_its_own_text(
+def test_a_plan_is_the_same_after_being_written_and_read(
     duration: float, scale: float, mass: list[float], frequency: float
 ) -> None:
     n = len(mass)
@@ -129,14 +129,14 @@ def test_a_plan_survives_its_own_text(
     assert returned.digest() == original.digest()
 
 
-def test_the_digest_tells_tests_apart_but_not_folders(default_plan: Plan) -> None:
+def test_the_digest_depends_on_the_test_but_not_on_the_recording_folder(default_plan: Plan) -> None:
     assert with_test(default_plan, scale=0.2).digest() != default_plan.digest()
     assert with_test(default_plan, seed=9).digest() != default_plan.digest()
     elsewhere = from_tables(default_plan.tables() | {"recording": {"folder": "elsewhere"}}, Path())
     assert elsewhere.digest() == default_plan.digest()
 
 
-def test_values_of_the_command_line_are_checked_like_those_of_a_file(default_plan: Plan) -> None:
+def test_values_of_the_command_line_are_checked_like_those_of_a_plan_file(default_plan: Plan) -> None:
     with pytest.raises(PlanError, match="duration"):
         with_test(default_plan, duration=-3.0)
 
@@ -147,7 +147,7 @@ def reality_of(default_plan: Plan, tmp_path: Path, text: str) -> reality.Reality
     return reality.load(path, default_plan)
 
 
-def test_a_reality_changes_what_it_names(default_plan: Plan, tmp_path: Path) -> None:
+def test_a_reality_changes_only_the_keys_that_it_gives(default_plan: Plan, tmp_path: Path) -> None:
     found = reality_of(
         default_plan,
         tmp_path,

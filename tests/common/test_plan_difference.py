@@ -45,7 +45,7 @@ def test_another_version_of_the_package_is_named_first(monkeypatch: Any) -> None
     assert difference.differences(ONE, heard, "slave", "master").startswith("in rths (master ")
 
 
-def test_many_differences_are_counted_not_listed() -> None:
+def test_many_differences_between_plans_are_counted_and_not_listed() -> None:
     limits = "".join(
         f"{name} = 0.01\n" for name in ("displacement", "velocity", "column_force", "table_step")
     )
@@ -57,7 +57,7 @@ def test_many_differences_are_counted_not_listed() -> None:
 
 
 @pytest.mark.parametrize("name", cli.SHIPPED)
-def test_what_is_said_goes_over_the_wire(name: str) -> None:
+def test_the_announced_plan_fits_into_a_message(name: str) -> None:
     plan = plans.load(cli.plan_path(name))
     text = difference.said(plan)
     assert difference.digest_of(text) == plan.digest()
@@ -67,7 +67,7 @@ def test_what_is_said_goes_over_the_wire(name: str) -> None:
         assert codec.decode(frame, codec.session_key(0, "")) == message
 
 
-def test_what_does_not_fit_is_said_by_digits(monkeypatch: Any) -> None:
+def test_values_that_do_not_fit_a_message_are_announced_as_digests(monkeypatch: Any) -> None:
     monkeypatch.setattr(difference, "MOST_TEXT", len(difference.said(OTHER)) - 1)
     assert told(ONE, OTHER).startswith("in structure.damping (master #")
     assert "duration" not in told(ONE, OTHER)
@@ -86,7 +86,7 @@ def test_what_does_not_fit_is_said_by_digits(monkeypatch: Any) -> None:
         some.just('0123456789abcdef {"a": 1}'),
     )
 )
-def test_a_strangers_words_are_only_shown_and_short(heard: str) -> None:
+def test_a_hostile_plan_announcement_is_shown_printable_and_short(heard: str) -> None:
     text = difference.differences(ONE, heard, "slave", "master")
     assert text.isprintable()
     assert len(text) < 1000

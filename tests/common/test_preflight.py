@@ -33,12 +33,12 @@ NOISE = {"column_displacement": 5e-6, "column_force": 100.0}
 # -- risks and gates ------------------------------------------------------------------------------
 
 
-def test_a_risk_refuses_unless_its_name_is_accepted() -> None:
+def test_a_risk_refuses_the_test_unless_its_name_is_accepted() -> None:
     assert preflight.check([PEAKS, LINK], ["link"]) == ([PEAKS], [LINK])
     assert preflight.check([], []) == ([], [])
 
 
-def test_a_refusal_is_one_sentence_that_says_how_to_overrule_it() -> None:
+def test_a_refusal_is_one_sentence_that_states_how_to_accept_the_risk() -> None:
     with pytest.raises(RefusedError) as error:
         Gate(["link"]).judge(
             [
@@ -55,7 +55,7 @@ def test_a_refusal_is_one_sentence_that_says_how_to_overrule_it() -> None:
     assert isinstance(error.value, RigError)  # a loop whose rig is refused as it arms stops in order
 
 
-def test_a_gate_tells_the_recording_once_what_was_passed_and_what_was_overruled() -> None:
+def test_passed_checks_and_accepted_risks_are_recorded_once() -> None:
     clock = VirtualClock()
     lab = Laboratory("master", Setting(Plan(), MemoryHub().join("master", clock), clock), TOPICS)
     gate = Gate(["peaks"])
@@ -71,7 +71,7 @@ def test_a_gate_tells_the_recording_once_what_was_passed_and_what_was_overruled(
 @pytest.mark.parametrize(
     ("word", "hint"), [("peeks", "did you mean peaks?"), ("x", "known here: building, disk, link")]
 )
-def test_a_risk_that_is_none_is_said_with_the_nearest(word: str, hint: str) -> None:
+def test_an_unknown_risk_to_accept_is_refused_with_the_nearest_name(word: str, hint: str) -> None:
     parser = argparse.ArgumentParser()
     cli.accept_argument(parser)
     assert cli.accepted_risks(parser.parse_args([])) == ()
@@ -84,7 +84,7 @@ def test_a_risk_that_is_none_is_said_with_the_nearest(word: str, hint: str) -> N
 # -- link -----------------------------------------------------------------------------------------
 
 
-def test_a_link_may_lose_nothing_and_be_late_as_often_as_the_plan_says() -> None:
+def test_preflight_accepts_no_loss_and_the_plans_share_of_late_messages() -> None:
     plan = Plan()
     quick, late = [0.0003] * 950, [0.0021] * 50
     assert link_risk(quick + late, 0, plan) is None
@@ -101,7 +101,7 @@ def test_a_link_may_lose_nothing_and_be_late_as_often_as_the_plan_says() -> None
     assert "p50 0.30 ms, p99 2.10 ms" in slow.sentence
 
 
-def test_a_link_over_which_nothing_comes_back_is_a_risk() -> None:
+def test_a_link_without_any_answer_is_a_risk() -> None:
     found = link_risk([], 1000, Plan())
     assert found is not None
     assert "none of 1000 exchanges over the link came back" in found.sentence
@@ -136,7 +136,7 @@ def frozen(rows: list[list[float]]) -> list[list[float]]:
         (at_rest(offset=0.11), "column_displacement of lab A is off zero by more than 10%", "of 0.03"),
     ],
 )
-def test_an_unsound_channel_at_rest_is_named(readings: Any, what: str, figures: str) -> None:
+def test_a_sensor_channel_that_is_faulty_at_rest_is_named(readings: Any, what: str, figures: str) -> None:
     for hidden in (False, True):
         found = sensor_risk(readings, NAMES, LIMITS, NOISE, hidden=hidden, lab="lab A")
         assert found is not None
@@ -145,7 +145,7 @@ def test_an_unsound_channel_at_rest_is_named(readings: Any, what: str, figures: 
         assert (figures in found.sentence) is not hidden
 
 
-def test_sound_channels_pass() -> None:
+def test_correct_sensor_channels_pass_the_check_at_rest() -> None:
     assert sensor_risk(at_rest(), NAMES, LIMITS, NOISE) is None
     assert sensor_risk(at_rest(factor=8.0, offset=0.09), NAMES, LIMITS, NOISE) is None
     assert sensor_risk(frozen(at_rest()), NAMES, LIMITS, {**NOISE, "column_force": 0.0}) is None
@@ -184,14 +184,14 @@ def armed(rig: Counting, gate: Gate, **options: Any) -> None:
     GuardedRig(rig, "lab A", ColumnMeasurement, at_rest=at_rest, **options).arm()
 
 
-def test_a_rig_that_says_so_is_read_at_rest_an_interval_apart() -> None:
+def test_a_rig_that_allows_idle_readings_is_read_once_per_interval_at_rest() -> None:
     rig, gate = Idle(), Gate()
     armed(rig, gate)
     assert rig.read_at == [2_000_000 * place for place in range(1, 6)]
     assert "Sensor check at rest: passed" in gate.passed[0][1]
 
 
-def test_another_rig_is_not_touched_and_nobody_sees_it_of_a_hidden_one() -> None:
+def test_a_rig_without_idle_readings_is_not_read_at_rest_and_a_hidden_one_gives_no_hint() -> None:
     rig, open_, hidden, idle = Counting(), Gate(), Gate(), Gate()
     armed(rig, open_)
     armed(rig, hidden, hidden=True)
@@ -201,14 +201,14 @@ def test_another_rig_is_not_touched_and_nobody_sees_it_of_a_hidden_one() -> None
     assert hidden.passed == idle.passed
 
 
-def test_a_twin_is_read_in_the_rigs_place() -> None:
+def test_a_twin_is_read_at_rest_in_place_of_its_rig() -> None:
     rig, twin = Idle(), Counting()
     armed(rig, Gate(), twin=lambda: twin)
     assert rig.read_at == []
     assert len(twin.read_at) == 5
 
 
-def test_a_refused_sensor_is_an_error_of_arming_and_can_be_overruled() -> None:
+def test_a_failed_sensor_check_stops_arming_unless_the_risk_is_accepted() -> None:
     class Off(Idle):
         def read(self) -> tuple[float, float]:
             return 0.02, super().read()[1]

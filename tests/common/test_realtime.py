@@ -1,4 +1,4 @@
-"""What a process is granted, tried in children: nothing here changes the process of the tests."""
+"""The real-time privileges of a process, tested in child processes so that the tests' own process is unchanged."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ say(granted=granted._asdict(), place=place, seen=seen, forked=os.waitpid(pid, 0)
 
 
 @pytest.mark.usefixtures("permitted")
-def test_the_flag_that_children_start_afresh_is_cleared() -> None:
+def test_the_reset_on_fork_flag_of_the_scheduler_is_cleared() -> None:
     found = said("""
 os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
 realtime.prepare("auto", None)
@@ -89,7 +89,7 @@ say(policy=os.sched_getscheduler(0))
 
 
 @pytest.mark.usefixtures("permitted")
-def test_all_is_granted_to_a_privileged_process_and_the_memory_is_locked() -> None:
+def test_a_privileged_process_gets_priority_and_processor_and_locks_its_memory() -> None:
     found = said("""
 granted = realtime.prepare("auto", None)
 locked = next(line for line in open("/proc/self/status") if line.startswith("VmLck:"))
@@ -106,7 +106,7 @@ say(granted=granted._asdict(), values=granted.values(), locked=int(locked.split(
     }
 
 
-def test_off_changes_no_scheduling_and_still_tightens_timers() -> None:
+def test_mode_off_leaves_the_scheduling_unchanged_and_tightens_timers() -> None:
     found = said("""
 before = os.sched_getaffinity(0)
 granted = realtime.prepare("off", None)
@@ -121,7 +121,7 @@ say(granted=granted._asdict(), free=os.sched_getaffinity(0) == before, scheduler
     assert found["switch"] == pytest.approx(realtime.SWITCH_INTERVAL)
 
 
-def test_without_privilege_auto_names_what_is_missing_and_goes_on() -> None:
+def test_without_privilege_mode_auto_names_what_is_missing_and_continues() -> None:
     found = said(f"""
 {BARE}
 resource.setrlimit(resource.RLIMIT_MEMLOCK, (65536, 65536))
@@ -139,7 +139,7 @@ say(granted=granted._asdict(), free=os.sched_getaffinity(0) == before)
     assert found["free"]
 
 
-def test_without_privilege_on_ends_in_one_line_and_exit_2() -> None:
+def test_without_privilege_mode_on_ends_with_one_line_and_exit_code_2() -> None:
     done = child(f"{BARE}\nsys.exit(cli.guarded(lambda: bool(realtime.prepare('on', None)) and 0))")
     assert done.returncode == 2
     assert done.stdout == ""
@@ -157,7 +157,7 @@ say(sentence=sentence)
     assert "RLIMIT_MEMLOCK is" not in found["sentence"]
 
 
-def test_a_limit_is_lifted_to_the_hard_one_and_not_beyond() -> None:
+def test_a_resource_limit_is_raised_to_the_hard_limit_and_not_beyond() -> None:
     found = said("""
 resource.setrlimit(resource.RLIMIT_NOFILE, (64, 128))
 if os.geteuid() == 0:
@@ -168,7 +168,7 @@ say(limits=limits, hard=resource.getrlimit(resource.RLIMIT_NOFILE)[1])
     assert found == {"limits": [64, 100, 128], "hard": 128}
 
 
-def test_memory_is_not_locked_where_it_would_leave_too_little() -> None:
+def test_memory_is_not_locked_where_too_little_would_remain() -> None:
     found = said("""
 realtime.spare_memory = lambda: 10_000_000
 realtime.raised = lambda name, wanted: -1
@@ -178,7 +178,7 @@ say(sentence=realtime.lock_memory())
     assert "9 MiB are spare" in found["sentence"]
 
 
-def test_a_limit_below_the_priority_gives_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_priority_limit_below_the_wanted_priority_gives_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     tried = []
 
     def schedule(_pid: int, policy: int, parameter: os.sched_param) -> None:
@@ -206,7 +206,7 @@ def test_a_refusal_within_the_limit_points_at_the_control_group(monkeypatch: pyt
 
 @pytest.mark.parametrize("mode", ["auto", "on"])
 @pytest.mark.parametrize("processor", [4095, -1])
-def test_a_processor_that_is_not_there_is_refused_with_those_that_are(mode: str, processor: int) -> None:
+def test_an_absent_processor_is_refused_and_the_present_ones_are_named(mode: str, processor: int) -> None:
     done = child(f"sys.exit(cli.guarded(lambda: bool(realtime.prepare({mode!r}, {processor})) and 0))")
     allowed = ", ".join(map(str, sorted(os.sched_getaffinity(0))))
     assert done.returncode == 2
@@ -216,7 +216,7 @@ def test_a_processor_that_is_not_there_is_refused_with_those_that_are(mode: str,
 
 
 @pytest.mark.parametrize("processor", [0, 4095, -1])
-def test_a_processor_is_refused_where_it_would_not_be_used(processor: int) -> None:
+def test_a_processor_is_refused_in_mode_off(processor: int) -> None:
     with pytest.raises(InputError, match="--processor needs --rt auto or on"):
         realtime.prepare("off", processor)
 
@@ -228,12 +228,12 @@ def test_a_processor_outside_the_set_of_the_process_is_refused(monkeypatch: pyte
         realtime.prepare("auto", 2)
 
 
-def test_an_unknown_mode_is_refused() -> None:
+def test_an_unknown_real_time_mode_is_refused() -> None:
     with pytest.raises(InputError, match="choose one of auto, on, off"):
         realtime.prepare("yes", None)
 
 
-def test_freezing_ends_the_collection_of_garbage() -> None:
+def test_freezing_stops_the_garbage_collector() -> None:
     found = said("""
 realtime.freeze()
 say(enabled=gc.isenabled(), frozen=gc.get_freeze_count(), switch=sys.getswitchinterval())
@@ -256,7 +256,7 @@ say(enabled=gc.isenabled(), frozen=gc.get_freeze_count(), switch=sys.getswitchin
         ([2, 1, 0], 6, [2, 1, 0, 1, 0, 1]),
     ],
 )
-def test_processors_are_given_out_with_the_masters_its_own(
+def test_processors_are_assigned_so_that_the_master_has_its_own(
     monkeypatch: pytest.MonkeyPatch, processors: list[int], count: int, expected: list[int | None]
 ) -> None:
     monkeypatch.setattr(realtime, "preferred", lambda: processors)
@@ -270,7 +270,7 @@ def test_one_processor_of_each_core_comes_first_and_processor_0_last(monkeypatch
     assert realtime.preferred() == [1, 0, 5, 4]
 
 
-def test_a_process_that_has_done_its_work_keeps_its_exit_code_under_late_signals() -> None:
+def test_a_finished_process_keeps_its_exit_code_when_late_signals_arrive() -> None:
     late = child("""
 import signal
 from common.host.stopping import Stopper

@@ -74,7 +74,7 @@ def test_what_is_written_is_read_back(tmp_path: Path, storeys: int) -> None:
     assert run.attachments["data"] == b"123"
 
 
-def test_the_public_reader_decodes_every_field_with_the_schema_in_the_file(tmp_path: Path) -> None:
+def test_the_mcap_library_decodes_every_field_with_the_schema_in_the_file(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     write(path, 3, storeys=2)
     classes: dict[int, Any] = {}
@@ -105,7 +105,7 @@ def test_the_public_reader_decodes_every_field_with_the_schema_in_the_file(tmp_p
 
 @settings(max_examples=25, deadline=None)
 @given(share=st.floats(0.0, 1.0))
-def test_a_file_cut_anywhere_is_read_up_to_there_or_refused(tmp_path_factory: Any, share: float) -> None:
+def test_a_truncated_file_is_read_up_to_the_cut_or_refused(tmp_path_factory: Any, share: float) -> None:
     path = tmp_path_factory.mktemp("cut") / "a.mcap"
     write(path, 2000)
     data = path.read_bytes()
@@ -121,7 +121,7 @@ def test_a_file_cut_anywhere_is_read_up_to_there_or_refused(tmp_path_factory: An
     assert run.finished or share < 1.0
 
 
-def test_a_recording_that_was_not_closed_holds_all_that_was_flushed(tmp_path: Path) -> None:
+def test_a_recording_that_was_not_closed_holds_all_flushed_samples(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     recording = write(path, 50, close=False)
     recording.flush()
@@ -133,7 +133,7 @@ def test_a_recording_that_was_not_closed_holds_all_that_was_flushed(tmp_path: Pa
 
 
 def in_chunks(path: Path, chunks: int, ticks: int = 2) -> Recording:
-    """A recording, still open, of so many chunks beyond its first with so many ticks each."""
+    """An open recording with this many chunks beyond its first, of this many ticks each."""
     recording = write(path, 0, close=False)
     for seq in range(chunks * ticks):
         for topic in ("master", "slave", "latency"):
@@ -143,14 +143,14 @@ def in_chunks(path: Path, chunks: int, ticks: int = 2) -> Recording:
     return recording
 
 
-def test_the_packed_index_is_the_librarys_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_packed_index_equals_the_mcap_librarys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     in_chunks(tmp_path / "packed.mcap", 200).close({})
     monkeypatch.setattr(index, "LIST", "_none")
     in_chunks(tmp_path / "own.mcap", 200).close({})
     assert (tmp_path / "packed.mcap").read_bytes() == (tmp_path / "own.mcap").read_bytes()
 
 
-def test_the_public_reader_finds_a_time_by_the_index(tmp_path: Path) -> None:
+def test_the_mcap_library_finds_a_time_by_the_index(tmp_path: Path) -> None:
     in_chunks(tmp_path / "a.mcap", 200).close({})
     with (tmp_path / "a.mcap").open("rb") as stream:
         reader = make_reader(stream)
@@ -162,7 +162,7 @@ def test_the_public_reader_finds_a_time_by_the_index(tmp_path: Path) -> None:
     assert sorted(message.sequence for _, _, message in found) == [100] * 3 + [101] * 3 + [102] * 3
 
 
-def test_a_recording_does_not_grow_with_the_test(tmp_path: Path) -> None:
+def test_the_memory_of_a_recording_does_not_grow_with_the_test(tmp_path: Path) -> None:
     recording = in_chunks(tmp_path / "a.mcap", 1)
     chunks = 4_000
     tracemalloc.start()
@@ -191,7 +191,7 @@ def test_schemas_and_plan_are_there_before_the_first_sample(tmp_path: Path) -> N
     recording.abandon()
 
 
-def test_what_is_no_recording_is_refused_with_a_sentence(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_recording_is_refused_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("hello " * 100)
     with pytest.raises(InputError, match="not a readable MCAP"):
         read(tmp_path / "text.mcap")
@@ -201,7 +201,7 @@ def test_what_is_no_recording_is_refused_with_a_sentence(tmp_path: Path) -> None
         Recording(tmp_path / "no" / "a.mcap", "trial", 1, TOPICS)
 
 
-def test_the_table_of_signals_is_the_contracts() -> None:
+def test_the_table_of_signals_has_the_specified_fields() -> None:
     contract = {
         "master": "seq t ground_acceleration displacement velocity acceleration absolute_acceleration column_target "
         "actuator_command column_displacement column_force numerical_force damper_force_used damper_force_seq "
@@ -216,7 +216,7 @@ def test_the_table_of_signals_is_the_contracts() -> None:
         assert [row.name for row in TOPICS[topic]][: len(names.split())] == names.split()
 
 
-def test_messages_packed_in_one_call_are_the_librarys_to_the_byte(
+def test_messages_packed_in_one_call_equal_the_mcap_librarys_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     packed = write(tmp_path / "packed.mcap", 500)
@@ -226,7 +226,7 @@ def test_messages_packed_in_one_call_are_the_librarys_to_the_byte(
     assert (tmp_path / "packed.mcap").read_bytes() == (tmp_path / "plain.mcap").read_bytes()
 
 
-def test_the_same_event_gives_the_same_bytes_in_whatever_order_its_values_come(tmp_path: Path) -> None:
+def test_an_events_bytes_do_not_depend_on_the_order_of_its_values(tmp_path: Path) -> None:
     values = dict.fromkeys(("b", "a", "slave.feedbacks.used", "ab"), 1.0)
     for name, table in (("a", values), ("b", dict(reversed(values.items())))):
         recording = Recording(tmp_path / name, "trial", 1, TOPICS)

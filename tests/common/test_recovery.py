@@ -1,4 +1,4 @@
-"""Recovering damaged recordings: cut, flipped, overwritten, with bytes put in or taken out."""
+"""Recovery of recordings that were cut, whose bits were flipped, or whose bytes were overwritten, added or removed."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def unfinished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_whole_recording_is_the_same_after_recovery(whole: Path, tmp_path: Path) -> None:
+def test_an_undamaged_recording_is_the_same_after_recovery(whole: Path, tmp_path: Path) -> None:
     before = whole.read_bytes()
     found = recover(whole, tmp_path / "out.mcap")
     assert found.complete
@@ -79,7 +79,7 @@ def test_a_cut_off_recording_loses_nothing_that_was_flushed(unfinished: Path, tm
 
 
 @pytest.mark.parametrize("place", [0.02, 0.4, 0.97])
-def test_a_flipped_bit_costs_one_chunk_and_names_what_was_in_it(
+def test_a_flipped_bit_costs_one_chunk_and_its_content_is_named(
     unfinished: Path, tmp_path: Path, place: float
 ) -> None:
     chunks = [spot for spot in spots(unfinished) if spot[0] == "Chunk"][1:]
@@ -100,7 +100,7 @@ def test_a_flipped_bit_costs_one_chunk_and_names_what_was_in_it(
         assert account.kept == TICKS - PER_FLUSH
 
 
-def test_the_summary_tells_what_is_lost_at_the_end(whole: Path, tmp_path: Path) -> None:
+def test_losses_at_the_end_are_known_from_the_summary(whole: Path, tmp_path: Path) -> None:
     _, _, end, chunk = [spot for spot in spots(whole) if spot[0] == "Chunk"][-1]
     broken, output = damaged(whole, tmp_path, lambda data: data.__setitem__(end - 7, data[end - 7] ^ 16))
     found = recover(broken, output)
@@ -112,7 +112,7 @@ def test_the_summary_tells_what_is_lost_at_the_end(whole: Path, tmp_path: Path) 
 
 @pytest.mark.parametrize("finished", [True, False])
 @pytest.mark.parametrize("kind", ["noise", "zeros"])
-def test_without_its_beginning_a_recording_is_read_by_the_copies_of_its_schemas(
+def test_a_recording_without_its_beginning_is_read_with_the_copies_of_its_schemas(
     tmp_path: Path, finished: bool, kind: str
 ) -> None:
     path = tmp_path / "long.mcap"
@@ -132,7 +132,7 @@ def test_without_its_beginning_a_recording_is_read_by_the_copies_of_its_schemas(
     assert found.origin_ns == 0
 
 
-def test_damaged_times_of_a_chunk_cost_nothing(unfinished: Path, tmp_path: Path) -> None:
+def test_a_chunk_with_damaged_times_is_recovered_completely(unfinished: Path, tmp_path: Path) -> None:
     _, begin, _, _ = [spot for spot in spots(unfinished) if spot[0] == "Chunk"][11]
     times = slice(begin + TIMES.start, begin + TIMES.stop)
     broken, output = damaged(unfinished, tmp_path, lambda data: data.__setitem__(times, garbage(16)))
@@ -143,7 +143,7 @@ def test_damaged_times_of_a_chunk_cost_nothing(unfinished: Path, tmp_path: Path)
 
 @pytest.mark.parametrize("kind", ["MessageIndex", "Channel"])
 @pytest.mark.parametrize("gone", [1, 8, 16, 70])
-def test_a_record_that_lost_bytes_takes_none_of_the_chunk_behind_it(
+def test_a_record_that_lost_bytes_does_not_cost_the_following_chunk(
     tmp_path: Path, kind: str, gone: int
 ) -> None:
     path, noise = tmp_path / "a.mcap", random.Random(1)
@@ -163,8 +163,8 @@ def test_a_record_that_lost_bytes_takes_none_of_the_chunk_behind_it(
     assert found.complete == (kind == "MessageIndex")
 
 
-def test_an_event_lost_behind_a_lost_index_is_counted(tmp_path: Path) -> None:
-    """A chunk may be smaller than the index before it, whose place it takes where that is gone."""
+def test_an_event_lost_after_a_lost_index_is_counted(tmp_path: Path) -> None:
+    """A chunk may be smaller than the lost index before it and then stand in its place."""
     path, noise = tmp_path / "events.mcap", random.Random(1)
     recording = Recording(path, "trial", 1, TOPICS)
     for seq in range(2 * PER_FLUSH):
@@ -187,7 +187,7 @@ def test_an_event_lost_behind_a_lost_index_is_counted(tmp_path: Path) -> None:
     assert found.chunks_lost == 1
 
 
-def test_a_first_chunk_with_a_flipped_bit_leaves_the_rest_readable(unfinished: Path, tmp_path: Path) -> None:
+def test_a_flipped_bit_in_the_first_chunk_leaves_the_rest_readable(unfinished: Path, tmp_path: Path) -> None:
     _, _, end, _ = next(spot for spot in spots(unfinished) if spot[0] == "Chunk")
     broken, output = damaged(unfinished, tmp_path, lambda data: data.__setitem__(end - 7, data[end - 7] ^ 1))
     assert read(unfinished).ticks("master") == TICKS
@@ -197,7 +197,7 @@ def test_a_first_chunk_with_a_flipped_bit_leaves_the_rest_readable(unfinished: P
     assert read(output).ticks("master") == TICKS
 
 
-def test_a_definition_without_a_checksum_does_not_win_over_one_with_it(whole: Path, tmp_path: Path) -> None:
+def test_a_definition_with_a_checksum_is_preferred_to_one_without(whole: Path, tmp_path: Path) -> None:
     data = whole.read_bytes()
     place = data.index(b"rths/trial/master")
     broken, output = damaged(whole, tmp_path, lambda data: data.__setitem__(place + 12, ord("M")))
@@ -205,7 +205,7 @@ def test_a_definition_without_a_checksum_does_not_win_over_one_with_it(whole: Pa
     assert set(read(output).columns) == set(TICK_TOPICS) == set(read(broken).columns)
 
 
-def test_damaged_metadata_and_attachments_are_named_and_nobody_uses_them(
+def test_damaged_metadata_and_attachments_are_named_and_not_used(
     whole: Path, tmp_path: Path, capsys: Any
 ) -> None:
     data = whole.read_bytes()
@@ -236,7 +236,7 @@ def test_lost_metadata_are_named(whole: Path, tmp_path: Path) -> None:
     assert not found.complete
 
 
-def test_nothing_is_lost_with_an_index(whole: Path, tmp_path: Path) -> None:
+def test_a_damaged_index_costs_no_data(whole: Path, tmp_path: Path) -> None:
     indices = [spot for spot in spots(whole) if spot[0] == "MessageIndex"]
     summary = next(spot for spot in spots(whole) if spot[0] == "Statistics")
 
@@ -252,7 +252,7 @@ def test_nothing_is_lost_with_an_index(whole: Path, tmp_path: Path) -> None:
     assert read_by_the_library(output) == read_by_the_library(whole)
 
 
-def test_what_was_never_recorded_is_not_lost_with_the_damage(tmp_path: Path) -> None:
+def test_ticks_that_were_never_recorded_do_not_count_as_lost(tmp_path: Path) -> None:
     path = tmp_path / "gap.mcap"
     write(path, skip=range(110, 115))
     found = recover(path, tmp_path / "out.mcap")
@@ -260,7 +260,9 @@ def test_what_was_never_recorded_is_not_lost_with_the_damage(tmp_path: Path) -> 
     assert found.topics["master"].unrecorded == 5
 
 
-def test_garbage_of_any_length_in_the_middle_costs_no_chunk_but_its_own(whole: Path, tmp_path: Path) -> None:
+def test_inserted_garbage_of_any_length_costs_only_the_chunk_that_it_hits(
+    whole: Path, tmp_path: Path
+) -> None:
     chunks = [spot for spot in spots(whole) if spot[0] == "Chunk"]
     _, begin, end, _ = chunks[5]
     middle = (begin + end) // 2
@@ -275,7 +277,7 @@ def test_garbage_of_any_length_in_the_middle_costs_no_chunk_but_its_own(whole: P
     assert recover(broken, output).chunks == len(chunks) - 1
 
 
-def test_input_and_existing_files_are_never_overwritten(whole: Path, tmp_path: Path) -> None:
+def test_recovery_never_overwrites_its_input_or_an_existing_file(whole: Path, tmp_path: Path) -> None:
     before = whole.read_bytes()
     link = tmp_path / "link.mcap"
     link.hardlink_to(whole)
@@ -288,7 +290,7 @@ def test_input_and_existing_files_are_never_overwritten(whole: Path, tmp_path: P
 
 
 @pytest.mark.parametrize("data", [b"", b"\x89MCAP0\r\n", b"hello " * 1000, bytes(3_000_000)])
-def test_where_nothing_can_be_recovered_it_is_said(tmp_path: Path, data: bytes) -> None:
+def test_a_file_without_recoverable_data_is_reported(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "a.mcap").write_bytes(data)
     with pytest.raises(InputError, match="Nothing can be recovered"):
         recover(tmp_path / "a.mcap", tmp_path / "out.mcap")
@@ -329,7 +331,7 @@ def apply(data: bytearray, change: Change) -> None:
 # a failing example has at most four changes, and to look for a smaller one takes minutes
 @settings(max_examples=60, phases=[Phase.explicit, Phase.generate])
 @given(changes=CHANGES, finished=st.booleans())
-def test_whatever_happens_to_a_file_all_of_its_whole_chunks_are_recovered(
+def test_all_intact_chunks_are_recovered_whatever_happens_to_a_file(
     whole: Path, unfinished: Path, tmp_path_factory: Any, changes: list[Change], finished: bool
 ) -> None:
     tmp_path = tmp_path_factory.mktemp("damaged")
@@ -364,11 +366,11 @@ def test_whatever_happens_to_a_file_all_of_its_whole_chunks_are_recovered(
 
 
 def describes_nothing(data: bytes) -> bool:
-    """Whether no copy of a schema is left whole."""
+    """Whether the data hold no intact copy of any schema."""
     return b"\nrths.Master" not in data
 
 
-def test_memory_stays_far_below_the_size_of_the_file(tmp_path: Path) -> None:
+def test_recovery_uses_far_less_memory_than_the_size_of_the_file(tmp_path: Path) -> None:
     path = tmp_path / "big.mcap"
     recording, noise = Recording(path, "trial", 1, TOPICS), random.Random(1)
     for seq in range(60_000):
@@ -386,7 +388,7 @@ def test_memory_stays_far_below_the_size_of_the_file(tmp_path: Path) -> None:
     assert peak < 4_000_000
 
 
-def test_the_place_of_a_record_is_that_of_its_opcode(whole: Path) -> None:
+def test_the_position_of_a_record_is_that_of_its_opcode(whole: Path) -> None:
     data = whole.read_bytes()
     for kind, begin, end, _ in spots(whole):
         if kind == "Chunk":

@@ -1,4 +1,4 @@
-"""What is lost of the ticks and of the ways to rest behind them."""
+"""Recovery of a recording whose ticks are followed by the ramps to rest."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RAMP = 100  # ticks, behind those of the test
 
 @pytest.fixture(scope="module")
 def with_ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Ticks and the ramps to rest behind them, a chunk for every 25."""
+    """A recording of ticks and then the ramps to rest, with a chunk for every 25."""
     path = tmp_path_factory.mktemp("ramp") / "a.mcap"
     recording, noise = Recording(path, "trial", 1, TOPICS), random.Random(1)
     for seq in range(TICKS + RAMP):
@@ -31,7 +31,7 @@ def with_ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def without(path: Path, folder: Path, places: slice, *, torn: bool = False) -> Any:
-    """The account of a file of whose chunks some are overwritten, and whose summary is cut off where it is torn."""
+    """The result of recovery after some chunks were overwritten and, where `torn`, the summary was cut off."""
     chunks = [spot for spot in spots(path) if spot[0] == "Chunk"][places]
 
     def change(data: bytearray) -> None:
@@ -44,7 +44,7 @@ def without(path: Path, folder: Path, places: slice, *, torn: bool = False) -> A
 
 
 @pytest.mark.parametrize("torn", [False, True])
-def test_a_hole_among_the_ticks_takes_nothing_from_the_ways_to_rest(
+def test_a_gap_among_the_ticks_costs_nothing_of_the_ramps_to_rest(
     with_ramp: Path, tmp_path: Path, torn: bool
 ) -> None:
     found = without(with_ramp, tmp_path, slice(3, 5), torn=torn)
@@ -62,7 +62,7 @@ def test_a_hole_among_the_ticks_takes_nothing_from_the_ways_to_rest(
         ((24, 28), (600, 699)),
     ],
 )
-def test_what_is_lost_of_a_way_to_rest_is_counted_behind_the_ticks(
+def test_losses_of_a_ramp_to_rest_are_counted_separately_from_the_ticks(
     with_ramp: Path, tmp_path: Path, chunks: tuple[int, int], lost: tuple[int, int]
 ) -> None:
     found = without(with_ramp, tmp_path, slice(*chunks))
@@ -72,9 +72,7 @@ def test_what_is_lost_of_a_way_to_rest_is_counted_behind_the_ticks(
         assert found.topics[topic].kept == RAMP - (lost[1] + 1 - lost[0])
 
 
-def test_a_hole_over_the_end_of_the_ticks_is_shared_with_the_way_to_rest(
-    with_ramp: Path, tmp_path: Path
-) -> None:
+def test_a_gap_across_the_end_of_the_ticks_counts_for_ticks_and_ramp(with_ramp: Path, tmp_path: Path) -> None:
     found = without(with_ramp, tmp_path, slice(23, 25))
     assert [hole[:2] for hole in found.topics["slave"].missing] == [(575, 599)]
     assert [hole[:2] for hole in found.topics["slave_ramp"].missing] == [(600, 624)]

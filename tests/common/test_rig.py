@@ -17,7 +17,7 @@ from loop.links import link_model
 
 
 class Fake:
-    """A rig that does what it is told to."""
+    """A rig whose readings and errors a test sets."""
 
     def __init__(self, reading: Any = (0.0, 0.0), error: Exception | None = None) -> None:
         self.reading, self.error = reading, error
@@ -61,14 +61,14 @@ def test_a_good_reading_becomes_a_measurement() -> None:
         (("a", 1.0), "not numbers"),
     ],
 )
-def test_a_wrong_reading_is_a_sentence_that_names_the_rig(reading: Any, sentence: str) -> None:
+def test_a_wrong_reading_gives_one_sentence_that_names_the_rig(reading: Any, sentence: str) -> None:
     with pytest.raises(RigError) as error:
         guarded(reading=reading).read()
     assert str(error.value).startswith("laboratory A (Fake): read() ")
     assert sentence in str(error.value)
 
 
-def test_whatever_a_rig_raises_is_a_sentence_that_names_it() -> None:
+def test_any_exception_of_a_rig_gives_one_sentence_that_names_it() -> None:
     rig = guarded(error=ZeroDivisionError("division by zero"))
     for call, word in (
         (rig.arm, "arm"),
@@ -130,7 +130,7 @@ def test_an_exception_of_a_rig_is_located_in_its_own_file(tmp_path: Path) -> Non
         ("arm async_read write disarm", "has an async method, which is never awaited, but must have read()"),
     ],
 )
-def test_a_rig_without_its_methods_is_refused_as_it_is_loaded(
+def test_a_rig_that_lacks_a_method_is_refused_when_it_is_loaded(
     tmp_path: Path, methods: str, sentence: str
 ) -> None:
     lines = ["class Lab:"]
@@ -148,7 +148,7 @@ def test_a_rig_without_its_methods_is_refused_as_it_is_loaded(
     assert sentence in str(error.value)
 
 
-def test_methods_that_a_rig_gets_from_elsewhere_serve() -> None:
+def test_methods_that_a_rig_delegates_are_accepted() -> None:
     class Wrapped:
         def __init__(self) -> None:
             self.inner = Fake()
@@ -160,7 +160,7 @@ def test_methods_that_a_rig_gets_from_elsewhere_serve() -> None:
     assert construct(Wrapped, {}, "[master.rig]", METHODS).read() == (0.0, 0.0)
 
 
-def test_a_link_without_fate_is_refused(short_plan: Plan, tmp_path: Path) -> None:
+def test_a_link_model_without_the_method_fate_is_refused(short_plan: Plan, tmp_path: Path) -> None:
     (tmp_path / "net.py").write_text(
         "class Net:\n    def __init__(self, seed): pass\n    def fate(self, seq): pass\n"
     )
@@ -171,7 +171,7 @@ def test_a_link_without_fate_is_refused(short_plan: Plan, tmp_path: Path) -> Non
         link_model(real)
 
 
-def test_a_class_is_found_in_a_file_and_in_a_module(tmp_path: Path) -> None:
+def test_a_class_is_loaded_from_a_file_and_from_a_module(tmp_path: Path) -> None:
     (tmp_path / "lab.py").write_text("class Lab:\n    def __init__(self, a):\n        self.a = a\n")
     kind = find("lab.py:Lab", tmp_path, "[master.rig]")
     assert construct(kind, {"a": 3}, "[master.rig]").a == 3
@@ -188,13 +188,15 @@ def test_a_class_is_found_in_a_file_and_in_a_module(tmp_path: Path) -> None:
         ("no.such.module:Lab", "Cannot load 'no.such.module'"),
     ],
 )
-def test_a_class_that_cannot_be_had_is_a_sentence(tmp_path: Path, reference: str, sentence: str) -> None:
+def test_a_class_that_cannot_be_loaded_gives_one_sentence(
+    tmp_path: Path, reference: str, sentence: str
+) -> None:
     (tmp_path / "lab.py").write_text("class Lab:\n    pass\n")
     (tmp_path / "broken.py").write_text("class Lab\n")
     with pytest.raises(InputError, match=sentence):
         find(reference, tmp_path, "[master.rig]")
 
 
-def test_options_that_do_not_fit_are_a_sentence() -> None:
+def test_options_that_do_not_fit_the_class_give_one_sentence() -> None:
     with pytest.raises(InputError, match=r"Cannot construct Fake named in \[master.rig\].*colour"):
         construct(Fake, {"colour": 1}, "[master.rig]")

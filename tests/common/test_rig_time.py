@@ -19,7 +19,7 @@ MS = 1_000_000
 
 
 class Slow:
-    """A rig whose calls move the clock on."""
+    """A rig whose calls advance the virtual clock."""
 
     def __init__(self, clock: VirtualClock, read_ms: float, write_ms: float) -> None:
         self.clock, self.read_ms, self.write_ms = clock, read_ms, write_ms
@@ -37,7 +37,7 @@ class Slow:
 
 
 def laboratory(plan: Plan, read_ms: float, write_ms: float, ticks: int, role: str = "slave") -> Laboratory:
-    """A laboratory that runs, after some ticks of a rig."""
+    """A running laboratory after some ticks of a rig."""
     clock = VirtualClock()
     lab = Laboratory(role, Setting(plan, MemoryHub(plan.roles).join(role, clock), clock), TOPICS)
     lab.enter(1)
@@ -59,7 +59,7 @@ def laboratory(plan: Plan, read_ms: float, write_ms: float, ticks: int, role: st
         (1.5, 1.6, "read() and write() took 3.1 ms of the interval's 2 ms"),
     ],
 )
-def test_a_slow_rig_is_named_where_its_loop_or_the_other_laboratory_notices_it(
+def test_a_slow_rig_is_named_when_its_own_loop_or_the_other_laboratory_trips(
     short_plan: Plan, read_ms: float, write_ms: float, sentence: str
 ) -> None:
     missed = Trip(1, "master", "lost", "No valid feedback from laboratory B for 10 ms.")
@@ -76,7 +76,7 @@ def test_a_slow_rig_is_named_where_its_loop_or_the_other_laboratory_notices_it(
         assert lab.error.exit_code == 3
 
 
-def test_a_rig_in_time_is_not_blamed(short_plan: Plan) -> None:
+def test_a_rig_that_answers_in_time_is_not_named_as_the_cause(short_plan: Plan) -> None:
     lab = laboratory(short_plan, 0.9, 0.9, 6)
     lab.overrun(12 * MS, 5)
     assert "The slave was held up for 12.0 ms" in str(lab.error)
@@ -85,7 +85,7 @@ def test_a_rig_in_time_is_not_blamed(short_plan: Plan) -> None:
     assert isinstance(lab.error, LostError)
 
 
-def test_who_missed_a_laboratory_names_its_slow_rig_once_that_is_known(short_plan: Plan) -> None:
+def test_a_lost_laboratorys_slow_rig_is_named_once_it_is_reported(short_plan: Plan) -> None:
     lab = laboratory(short_plan, 0.0, 0.0, 1, role="master")
     lab.silent("slave", 5)
     assert isinstance(lab.error, LostError)

@@ -10,7 +10,7 @@ from tests.benchmarks.test_quick import IN_REAL_TIME, plain
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(IN_REAL_TIME))
-def test_a_benchmark_runs(name: str) -> None:
+def test_a_benchmark_runs_and_gives_figures(name: str) -> None:
     found = plain(BENCHMARKS[name](quick=True))
     assert all(figure["median"] is not None for figure in found if "cable" not in figure["name"])
 

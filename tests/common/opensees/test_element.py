@@ -1,4 +1,4 @@
-"""What a server answers a client of OpenSees or OpenFresco, without sockets."""
+"""The answers of the element server to a client of OpenSees or OpenFresco, without sockets."""
 
 from __future__ import annotations
 
@@ -55,14 +55,14 @@ def test_matrices_are_answered_from_memory() -> None:
     assert answers(one, wire.element(2), 4) == [diagonal, diagonal, none, none]
 
 
-def test_at_rest_the_force_is_zero_and_nothing_is_wanted() -> None:
+def test_at_rest_the_answered_force_is_zero_and_no_measurement_is_requested() -> None:
     one = server()
     one.take(said(MessageCode.TRIAL) + said(MessageCode.FORCE))
     assert answers(one) == [(0.0,)]
     assert one.phase is Phase.MEASURED
 
 
-def test_a_force_waits_for_its_measurement() -> None:
+def test_a_request_for_the_force_is_answered_once_it_is_measured() -> None:
     one = server()
     one.take(said(MessageCode.TRIAL, 1e-3) + said(MessageCode.DAMPING) + said(MessageCode.FORCE))
     assert one.phase is Phase.WANTED
@@ -75,7 +75,7 @@ def test_a_force_waits_for_its_measurement() -> None:
     assert not one.waits
 
 
-def test_a_step_of_newmark_explicit_moves_once() -> None:
+def test_a_step_of_newmark_explicit_imposes_one_displacement() -> None:
     """The trials after the solution repeat the displacement, with other velocities."""
     one = server()
     for step in range(1, 4):
@@ -143,7 +143,7 @@ def test_a_step_at_rest_with_a_velocity_that_is_not_finite_is_refused() -> None:
         one.take(said(MessageCode.COMMIT))
 
 
-def test_a_revised_displacement_is_refused_with_integrators_that_fit() -> None:
+def test_a_revised_displacement_is_refused_and_suitable_integrators_are_named() -> None:
     one = server()
     one.take(said(MessageCode.TRIAL, 1e-3) + said(MessageCode.FORCE))
     moved(one, 1.0)
@@ -151,14 +151,14 @@ def test_a_revised_displacement_is_refused_with_integrators_that_fit() -> None:
         one.take(said(MessageCode.TRIAL, 1.1e-3))
 
 
-def test_a_revised_displacement_is_refused_before_it_is_imposed_too() -> None:
-    """Whether the laboratories had the time to move does not decide."""
+def test_a_revised_displacement_is_refused_even_before_the_first_was_imposed() -> None:
+    """The refusal does not depend on whether the laboratories had time to move."""
     one = server()
     with pytest.raises(RevisedError):
         one.take(said(MessageCode.TRIAL, 1e-3) + said(MessageCode.TRIAL, 2e-3))
 
 
-def test_the_rounding_of_an_iteration_revises_nothing() -> None:
+def test_a_change_by_rounding_does_not_count_as_a_revised_displacement() -> None:
     one = server()
     one.take(
         said(MessageCode.TRIAL, 1e-3)
@@ -168,7 +168,7 @@ def test_the_rounding_of_an_iteration_revises_nothing() -> None:
     assert one.wanted.displacement == (1e-3,)
 
 
-def test_displacements_of_a_client_that_does_not_wait_come_one_after_the_other() -> None:
+def test_displacements_of_a_client_that_does_not_wait_are_imposed_in_order() -> None:
     one = server()
     one.take(
         b"".join(said(MessageCode.TRIAL, x) + said(MessageCode.COMMIT) for x in (1e-3, 2e-3, 3e-3))
@@ -182,7 +182,7 @@ def test_displacements_of_a_client_that_does_not_wait_come_one_after_the_other()
     assert one.phase is Phase.ENDED
 
 
-def test_openfresco_acquires_all_that_its_header_says_and_commits_nothing() -> None:
+def test_openfresco_acquires_every_quantity_of_its_header_and_needs_no_commit() -> None:
     one = server(FRESCO)
     one.take(said(MessageCode.TRIAL, 0.0, FRESCO) + said(MessageCode.ACQUIRE, 0.0, FRESCO))
     for x in (1e-3, 2e-3):
@@ -193,7 +193,7 @@ def test_openfresco_acquires_all_that_its_header_says_and_commits_nothing() -> N
     assert answers(one, FRESCO, 3) == [(0.0, 0.0, 0.0), (1e-3, K * 1e-3, 0.25), (2e-3, K * 2e-3, 0.25)]
 
 
-def test_the_end_is_the_end() -> None:
+def test_after_the_end_message_no_request_is_answered() -> None:
     one = server()
     one.take(said(MessageCode.END) + said(MessageCode.FORCE))
     assert one.phase is Phase.ENDED
@@ -219,7 +219,7 @@ def test_the_last_displacements_are_imposed_before_the_end() -> None:
         (ClientHeader(Sizes(displacement=1, time=2), Sizes(force=1), 256), "acquires 1 forces"),
     ],
 )
-def test_a_client_that_wants_what_there_is_not_is_refused(header: ClientHeader, says: str) -> None:
+def test_a_client_that_asks_for_unavailable_quantities_is_refused(header: ClientHeader, says: str) -> None:
     with pytest.raises(RemoteProtocolError, match=says):
         server(header)
 
@@ -231,7 +231,7 @@ def test_messages_too_short_for_a_matrix_are_refused() -> None:
 
 
 @given(st.lists(st.integers(1, 7), min_size=1, max_size=8))
-def test_how_the_bytes_are_cut_changes_nothing(lengths: list[int]) -> None:
+def test_the_result_does_not_depend_on_how_the_bytes_are_split(lengths: list[int]) -> None:
     data = (
         wire.header_bytes(HEADER)
         + said(MessageCode.TRIAL, 1e-3)
@@ -248,7 +248,7 @@ def test_how_the_bytes_are_cut_changes_nothing(lengths: list[int]) -> None:
 
 
 @given(st.binary(max_size=300))
-def test_no_bytes_do_harm(data: bytes) -> None:
+def test_arbitrary_bytes_are_refused_or_leave_a_valid_phase(data: bytes) -> None:
     one = ElementServer([K])
     try:
         one.take(data)

@@ -1,4 +1,4 @@
-"""The bytes of OpenSees and OpenFresco: every value comes back, and no bytes do harm."""
+"""The wire format of OpenSees and OpenFresco: values are read back as written, and wrong bytes are refused."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ def test_the_header_of_an_element_is_what_opensees_sends() -> None:
 
 
 @given(HEADERS)
-def test_headers_come_back(header: ClientHeader) -> None:
+def test_headers_are_read_back_as_written(header: ClientHeader) -> None:
     assert wire.read_header(wire.header_bytes(header)) == header
 
 
 @given(st.data())
-def test_commanded_values_come_back_bit_by_bit(data: st.DataObject) -> None:
+def test_commanded_values_are_read_back_to_the_last_bit(data: st.DataObject) -> None:
     header, code = data.draw(HEADERS), data.draw(st.sampled_from(MessageCode))
     values = data.draw(values_of(header.control))
     sent = wire.message(header, code, values)
@@ -51,7 +51,7 @@ def test_commanded_values_come_back_bit_by_bit(data: st.DataObject) -> None:
 
 
 @given(st.data())
-def test_acquired_values_come_back_bit_by_bit(data: st.DataObject) -> None:
+def test_acquired_values_are_read_back_to_the_last_bit(data: st.DataObject) -> None:
     header = data.draw(HEADERS)
     values = data.draw(values_of(header.acquired))
     sent = wire.answer(header, [number for several in values for number in several])
@@ -60,7 +60,7 @@ def test_acquired_values_come_back_bit_by_bit(data: st.DataObject) -> None:
 
 
 @given(st.binary(min_size=44, max_size=44))
-def test_any_first_bytes_are_a_header_or_are_refused(data: bytes) -> None:
+def test_any_first_bytes_are_read_as_a_valid_header_or_refused(data: bytes) -> None:
     try:
         header = wire.read_header(data)
     except RemoteProtocolError:
@@ -69,7 +69,7 @@ def test_any_first_bytes_are_a_header_or_are_refused(data: bytes) -> None:
 
 
 @given(st.binary(min_size=8 * 16, max_size=8 * 16))
-def test_any_bytes_are_a_message_or_are_refused(data: bytes) -> None:
+def test_any_bytes_are_read_as_a_message_or_refused(data: bytes) -> None:
     header = wire.element(4, data=16)
     try:
         assert wire.code_in(data) in MessageCode
@@ -86,18 +86,18 @@ def test_a_value_that_is_not_finite_is_refused() -> None:
             wire.commanded(header, sent)
 
 
-def test_large_values_are_finite_although_their_sum_is_not() -> None:
+def test_large_finite_values_are_accepted_although_their_sum_overflows() -> None:
     header = wire.element(1)
     values = Quantities((1.7e308,), (1.7e308,), (1.7e308,), (), (0.0,))
     assert wire.commanded(header, wire.message(header, MessageCode.TRIAL, values)) == values
 
 
-def test_the_other_order_of_bytes_is_refused() -> None:
+def test_big_endian_headers_are_refused() -> None:
     with pytest.raises(RemoteProtocolError, match="order of bytes"):
         wire.read_header(struct.pack(">11i", 1, 1, 1, 0, 1, 0, 0, 0, 1, 0, 256))
 
 
-def test_numbers_that_do_not_fit_the_header_are_a_fault_of_the_caller() -> None:
+def test_a_caller_whose_values_do_not_fit_the_header_gets_a_value_error() -> None:
     header = wire.element(1)
     with pytest.raises(ValueError, match="2 values of displacement"):
         wire.message(header, MessageCode.TRIAL, Quantities((0.0, 0.0), (0.0,), (0.0,), (), (0.0,)))

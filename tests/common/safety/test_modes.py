@@ -21,7 +21,7 @@ def brought_to(*turns: Turn) -> Safety:
     return safety
 
 
-def test_every_mode_is_in_the_table_reachable_and_every_turn_explained() -> None:
+def test_every_safety_mode_is_reachable_and_every_transition_is_documented() -> None:
     found, frontier = {Mode.IDLE}, [Mode.IDLE]
     while frontier:
         new = set(TURNS[frontier.pop()].values()) - found
@@ -31,23 +31,23 @@ def test_every_mode_is_in_the_table_reachable_and_every_turn_explained() -> None
     assert {turn for row in TURNS.values() for turn in row} == set(Turn) == set(MEANING)
 
 
-def test_an_emergency_stop_is_possible_everywhere_but_in_itself() -> None:
+def test_an_emergency_stop_is_possible_from_every_other_mode() -> None:
     for mode in set(Mode) - {Mode.EMERGENCY_STOP}:
         assert TURNS[mode][Turn.EMERGENCY] is Mode.EMERGENCY_STOP
 
 
-def test_a_latched_mode_is_left_by_a_reset_alone() -> None:
+def test_only_a_reset_leaves_a_latched_mode() -> None:
     for mode in LATCHED:
         assert set(TURNS[mode]) <= {Turn.RESET, Turn.EMERGENCY}
         assert TURNS[mode][Turn.RESET] is Mode.IDLE
 
 
-def test_a_moving_rig_never_stops_by_a_jump_to_safe() -> None:
+def test_a_moving_rig_ramps_to_rest_after_a_trip_or_the_end() -> None:
     for mode in (Mode.RUNNING, Mode.HOLDING):
         assert TURNS[mode][Turn.TRIP] is TURNS[mode][Turn.END] is Mode.RAMPING
 
 
-def test_the_course_of_a_test() -> None:
+def test_the_modes_of_a_test_follow_in_order_from_configure_to_idle() -> None:
     told: list[tuple[Mode, Turn, Mode]] = []
     safety = Safety(lambda *turn: told.append(turn))
     for turn in (Turn.CONFIGURE, Turn.ARM, Turn.RUN, Turn.HOLD, Turn.RESUME, Turn.END):
@@ -58,7 +58,7 @@ def test_the_course_of_a_test() -> None:
     assert [after for _, _, after in told][-3:] == [Mode.RUNNING, Mode.RAMPING, Mode.IDLE]
 
 
-def test_the_first_cause_stays_and_ends_in_the_latched_mode() -> None:
+def test_the_first_cause_is_kept_and_its_latched_mode_follows_the_ramp() -> None:
     safety = brought_to(Turn.CONFIGURE, Turn.ARM, Turn.RUN)
     safety.trip(CAUSE)
     safety.trip(CAUSE._replace(code="watchdog"))
@@ -68,14 +68,14 @@ def test_the_first_cause_stays_and_ends_in_the_latched_mode() -> None:
     assert safety.cause == CAUSE
 
 
-def test_a_trip_on_the_way_to_rest_after_an_orderly_end_is_latched_too() -> None:
+def test_a_trip_during_the_ramp_after_an_orderly_end_is_latched() -> None:
     safety = brought_to(Turn.CONFIGURE, Turn.ARM, Turn.RUN, Turn.END)
     safety.trip(CAUSE)
     safety.at_rest()
     assert safety.mode is Mode.SAFE
 
 
-def test_reset_needs_to_be_admitted_and_forgets_the_cause() -> None:
+def test_only_the_reset_method_resets_and_it_clears_the_cause() -> None:
     safety = brought_to(Turn.CONFIGURE, Turn.ARM)
     safety.trip(CAUSE)
     assert safety.mode is Mode.SAFE
@@ -85,7 +85,7 @@ def test_reset_needs_to_be_admitted_and_forgets_the_cause() -> None:
     assert (safety.mode, safety.cause) == (Mode.IDLE, None)
 
 
-def test_a_press_that_is_held_repeated_or_replayed_is_one_press() -> None:
+def test_an_operators_key_that_is_held_repeated_or_replayed_counts_as_one_press() -> None:
     safety = Safety(silent)
     assert safety.pressed(5)
     assert not safety.pressed(5)
@@ -94,7 +94,7 @@ def test_a_press_that_is_held_repeated_or_replayed_is_one_press() -> None:
 
 
 @given(st.lists(st.sampled_from(Turn)))
-def test_only_what_the_table_has_changes_the_mode(turns: list[Turn]) -> None:
+def test_only_transitions_of_the_table_change_the_mode(turns: list[Turn]) -> None:
     safety = Safety(silent)
     for turn in turns:
         before = safety.mode
@@ -107,7 +107,7 @@ def test_only_what_the_table_has_changes_the_mode(turns: list[Turn]) -> None:
             assert safety.mode is before
 
 
-def test_the_diagram_has_every_turn() -> None:
+def test_the_state_diagram_has_every_transition() -> None:
     lines = mermaid().splitlines()
     assert lines[0] == "stateDiagram-v2"
     assert sum(" --> " in line and ": " in line for line in lines) == sum(map(len, TURNS.values()))

@@ -14,7 +14,7 @@ PLAN = SafetyTable(velocity=0.05, acceleration=10.0, jerk=2000.0, release=0.02)
 
 
 def run(ramp: MotionRamp, force_of: float | None = None, most: int = 5000) -> list[float]:
-    """Commands until it is done; the specimen is a spring of that stiffness (N/m), none where nothing is measured."""
+    """The ramp's commands until it is done; the specimen is a spring of this stiffness (N/m); None: no reading."""
     commands = [ramp.command]
     while not ramp.done:
         commands.append(ramp.step(None if force_of is None else force_of * commands[-1]))
@@ -24,7 +24,7 @@ def run(ramp: MotionRamp, force_of: float | None = None, most: int = 5000) -> li
 
 @given(st.floats(-0.05, 0.05), st.floats(-0.5, 0.5))
 @settings(deadline=None)
-def test_it_stops_within_its_bounds_and_never_steps(position: float, velocity: float) -> None:
+def test_the_ramp_stops_within_its_bounds_and_without_a_step(position: float, velocity: float) -> None:
     commands = run(MotionRamp(PLAN, INTERVAL, position, velocity, unload=False))
     speeds = np.diff(commands, prepend=position - velocity * INTERVAL) / INTERVAL
     changes = np.diff(speeds) / INTERVAL
@@ -39,7 +39,7 @@ def test_it_stops_within_its_bounds_and_never_steps(position: float, velocity: f
 
 @given(st.floats(-0.05, 0.05), st.floats(-0.3, 0.3))
 @settings(deadline=None)
-def test_it_unloads_an_elastic_specimen_to_nothing(position: float, velocity: float) -> None:
+def test_the_ramp_unloads_an_elastic_specimen_to_zero_force(position: float, velocity: float) -> None:
     commands = run(MotionRamp(PLAN, INTERVAL, position, velocity, unload=True), 12.5e6)
     held = position + math.copysign(velocity**2 / (2 * PLAN.acceleration), velocity)
     assert abs(commands[-1]) <= 0.01 * abs(held) + 2 * PLAN.velocity * INTERVAL + 5e-4
@@ -47,7 +47,7 @@ def test_it_unloads_an_elastic_specimen_to_nothing(position: float, velocity: fl
     assert speeds.max() <= max(abs(velocity), PLAN.velocity) + 1e-9
 
 
-def test_a_specimen_that_has_yielded_is_left_where_its_force_is_gone() -> None:
+def test_a_yielded_specimen_is_left_at_the_displacement_of_zero_force() -> None:
     ramp = MotionRamp(PLAN, INTERVAL, 0.010, 0.0, unload=True)
     while not ramp.done:
         ramp.step(1e6 * (ramp.command - 0.006))  # 6 mm of residual deformation
@@ -65,7 +65,7 @@ def test_an_elastic_specimen_whose_force_still_lags_at_the_hold_is_unloaded() ->
     assert ramp.left == 0.0
 
 
-def test_a_force_that_opposes_the_unloading_to_the_end_leaves_the_specimen_at_the_hold() -> None:
+def test_a_force_that_keeps_opposing_the_unloading_leaves_the_specimen_at_the_hold_position() -> None:
     ramp, ticks = MotionRamp(PLAN, INTERVAL, 0.001, 0.0, unload=True), 0
     left = ramp.left
     while not ramp.done:
@@ -75,12 +75,12 @@ def test_a_force_that_opposes_the_unloading_to_the_end_leaves_the_specimen_at_th
     assert PLAN.settle <= ticks * INTERVAL <= left
 
 
-def test_without_a_reading_it_holds() -> None:
+def test_without_a_force_reading_the_ramp_holds_its_position() -> None:
     commands = run(MotionRamp(PLAN, INTERVAL, 0.01, 0.0, unload=True))
     assert commands[-1] == 0.01
 
 
-def test_the_motor_force_is_zero_after_its_time_without_a_step() -> None:
+def test_the_motor_force_reaches_zero_in_its_time_without_a_step() -> None:
     release = ForceRelease(PLAN, INTERVAL, 50.0)
     forces = [release.step() for _ in range(12)]
     assert forces[9] == forces[11] == 0.0
