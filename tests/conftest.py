@@ -119,7 +119,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.fixture(autouse=True)
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No command says how far it is because this machine is slow today."""
+    """No command prints progress because this machine is slow at the moment."""
     monkeypatch.setattr("report.text.progress.UNSAID", math.inf)
 
 

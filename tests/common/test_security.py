@@ -1,4 +1,4 @@
-"""Certificates: made, checked, and what is said of those that cannot be used."""
+"""Certificates are made and checked, and those that cannot be used are refused with the reason."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def copy(base: Path, tmp_path: Path) -> Path:
-    """A copy of it that may be spoilt."""
+    """A copy of the folder that a test may damage."""
     shutil.copytree(base / "keys", tmp_path / "keys")
     return tmp_path
 
@@ -79,7 +79,7 @@ def test_keys_are_made_for_every_role_and_only_their_owner_reads_them(
     assert timedelta(days=3) < master.not_valid_after_utc - master.not_valid_before_utc < timedelta(days=4)
 
 
-def test_only_the_masters_certificate_serves_to_listen_and_it_serves_nothing_else(base: Path) -> None:
+def test_only_the_masters_certificate_is_for_servers_and_it_is_for_nothing_else(base: Path) -> None:
     assert purposes(base / "keys/master.pem") == [ExtendedKeyUsageOID.SERVER_AUTH]
     for role in ROLES[1:]:
         assert purposes(base / f"keys/{role}.pem") == [ExtendedKeyUsageOID.CLIENT_AUTH]
@@ -93,7 +93,7 @@ def test_the_slaves_of_a_plan_get_a_certificate_each(tmp_path: Path) -> None:
         assert found == {"master", "slave.roof", "slave.middle", "recorder", "operator", "observer"}
 
 
-def test_nothing_is_overwritten(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_existing_certificates_are_not_overwritten(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = (copy / "keys/master.key").read_bytes()
     assert made_by(copy / "keys") == 2
     assert "keys are never overwritten: name a new folder" in capsys.readouterr().err
@@ -111,7 +111,7 @@ def test_nothing_is_overwritten(copy: Path, capsys: pytest.CaptureFixture[str]) 
         (("--plan", "nowhere.toml"), "Cannot read the plan nowhere.toml"),
     ],
 )
-def test_what_cannot_be_made_is_said_and_leaves_nothing(
+def test_a_failure_to_make_certificates_is_reported_and_leaves_no_files(
     words: tuple[str, ...], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert made_by(tmp_path / "keys", *words) == 2
@@ -122,7 +122,7 @@ def test_what_cannot_be_made_is_said_and_leaves_nothing(
 # -- checking ----------------------------------------------------------------------------------------
 
 
-def test_a_role_reads_its_own_files_and_the_authoritys_certificate_alone(copy: Path) -> None:
+def test_a_role_reads_only_its_own_files_and_the_authoritys_certificate(copy: Path) -> None:
     for path in (copy / "keys").iterdir():
         if path.name not in ("authority.pem", "slave.pem", "slave.key"):
             path.unlink()
@@ -133,14 +133,14 @@ def test_a_role_reads_its_own_files_and_the_authoritys_certificate_alone(copy: P
     assert "PRIVATE" not in repr(found) + repr(found.settings())
 
 
-def test_a_missing_file_is_named(copy: Path) -> None:
+def test_a_message_about_a_missing_certificate_file_names_the_file(copy: Path) -> None:
     for name in ("slave.key", "slave.pem", "authority.pem"):
         (copy / "keys" / name).unlink()
         with pytest.raises(InputError, match=rf"Cannot read .*{name}, .*No such file .*rths keys"):
             security.identity(secure_plan(copy), "slave")
 
 
-def test_a_file_that_is_none_is_named(copy: Path) -> None:
+def test_a_message_about_an_invalid_certificate_file_names_it(copy: Path) -> None:
     (copy / "keys/slave.key").write_text("nothing")
     with pytest.raises(InputError, match=r"slave.key is not a private key"):
         security.identity(secure_plan(copy), "slave")
@@ -169,7 +169,7 @@ def test_the_certificate_of_another_authority_is_refused(copy: Path, tmp_path: P
         security.identity(secure_plan(copy), "slave")
 
 
-def test_a_certificate_must_be_valid_from_now_until_the_test_is_over(base: Path) -> None:
+def test_a_certificate_must_be_valid_until_the_end_of_the_test(base: Path) -> None:
     test = secure_plan(base)  # 30 s for the others to come, 2 s of test
     assert security.identity(test, "slave", NOW + DAY - timedelta(seconds=40))
     for now, sentence in (
@@ -191,7 +191,7 @@ def test_a_certificate_that_expired_before_its_authority_is_named(base: Path, tm
 # -- endpoints ---------------------------------------------------------------------------------------
 
 
-def test_with_security_an_endpoint_is_one_of_tls() -> None:
+def test_with_security_every_endpoint_uses_tls() -> None:
     assert secured("tcp/127.0.0.1:7447") == secured("tls/127.0.0.1:7447") == "tls/127.0.0.1:7447"
     assert secured("") == ""
     with pytest.raises(InputError, match=r"'udp/127.0.0.1:7447' cannot be used with \[link.security\]"):
@@ -200,20 +200,20 @@ def test_with_security_an_endpoint_is_one_of_tls() -> None:
         secured("somewhere")
 
 
-def test_an_address_that_zenoh_cannot_verify_is_not_dialled() -> None:
+def test_an_address_that_zenoh_cannot_verify_is_refused() -> None:
     assert dialled("tcp/lab-a:7447") == "tls/lab-a:7447"
     with pytest.raises(InputError, match=r"cannot be dialled with \[link.security\]: give the master's name"):
         dialled("tcp/[::1]:7447")
 
 
-def test_an_endpoint_on_loopback_is_known_as_such() -> None:
+def test_an_endpoint_on_loopback_is_recognized() -> None:
     assert all(map(loopback, ("", "tcp/127.0.0.1:1", "tcp/127.1.2.3:1", "tls/localhost:1", "tcp/[::1]:1")))
     assert not any(map(loopback, ("tcp/0.0.0.0:1", "tcp/192.0.2.1:1", "tcp/[::]:1", "tcp/lab-a:1")))
     assert place("tcp/[::1]:7447") == ("::1", 7447)
 
 
 @pytest.mark.parametrize(("endpoint", "warned"), [("tcp/127.0.0.1:0", False), ("tcp/0.0.0.0:0", True)])
-def test_an_open_link_that_others_reach_is_warned_of(
+def test_an_unencrypted_link_that_others_can_reach_gives_a_warning(
     endpoint: str, warned: bool, default_plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Link:
@@ -245,7 +245,7 @@ def allowed(control: Any, role: str, flow: str, message: str) -> set[str]:
     }
 
 
-def test_a_role_may_use_its_own_routes_and_no_others() -> None:
+def test_a_role_may_use_only_its_own_routes() -> None:
     slaves = ("slave.roof", "slave.middle")
     name = partial(key, "test")
     control: Any = access_control(slaves, name)

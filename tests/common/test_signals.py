@@ -1,4 +1,4 @@
-"""The rows of every topic follow from the channels of the laboratories."""
+"""The signals of every topic follow from the channels of the laboratories."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def names(laboratories: dict[str, signals.Channels], topic: str) -> list[str]:
     return [row.name for row in signals.topics(laboratories)[topic]]
 
 
-def test_a_signal_that_the_master_has_too_is_called_sent_there() -> None:
+def test_a_slaves_signal_that_the_master_also_has_gets_the_prefix_sent() -> None:
     found = names({"master": COLUMN_CHANNELS, "slave": COLUMN_CHANNELS}, "master")
     assert found[-7:] == [
         "column_force_used",
@@ -31,7 +31,7 @@ def test_a_signal_that_the_master_has_too_is_called_sent_there() -> None:
     ]
 
 
-def test_a_master_without_a_laboratory_has_the_building_and_what_each_kind_of_slave_was_sent() -> None:
+def test_a_master_without_a_laboratory_has_the_signals_of_the_building_and_of_its_commands() -> None:
     laboratories = {"slave.a": TABLE_CHANNELS, "slave.b": COLUMN_CHANNELS, "slave.c": TABLE_CHANNELS}
     table = signals.topics(laboratories)
     assert "master_ramp" not in table
@@ -53,7 +53,7 @@ def test_two_signals_of_one_name_are_refused() -> None:
         signals.topics({"master": mine})
 
 
-def test_a_recording_says_what_its_signals_are_and_gives_each_slave_its_share(tmp_path: Path) -> None:
+def test_a_recording_states_the_meaning_of_its_signals_and_splits_them_by_slave(tmp_path: Path) -> None:
     laboratories = {"slave.a": TABLE_CHANNELS, "slave.b": COLUMN_CHANNELS, "slave.c": TABLE_CHANNELS}
     table, path = signals.topics(laboratories), tmp_path / "a.mcap"
     recording = Recording(path, "trial", 1, table, list(laboratories))
@@ -76,7 +76,7 @@ def test_a_recording_says_what_its_signals_are_and_gives_each_slave_its_share(tm
     assert "table_target" not in column
 
 
-def test_a_recording_that_does_not_say_it_has_the_meanings_of_the_kinds_that_ship(tmp_path: Path) -> None:
+def test_a_recording_without_stated_meanings_gets_those_of_the_shipped_kinds(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     recording = Recording(path, "trial", 1, signals.TOPICS)
     recording.add("slave", 0, 0, [0] * len(signals.TOPICS["slave"]))

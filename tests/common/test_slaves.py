@@ -33,13 +33,13 @@ def two() -> Plan:
     return parse(TWO, Path())
 
 
-def test_one_slave_has_no_name(default_plan: Plan) -> None:
+def test_a_single_slave_has_no_name(default_plan: Plan) -> None:
     assert default_plan.roles == ("slave",)
     assert default_plan.slaves == {}
     assert default_plan.of("slave") is default_plan
 
 
-def test_named_slaves_come_in_the_order_of_the_file_with_their_own_keys_over_the_common_ones() -> None:
+def test_named_slaves_keep_the_order_of_the_file_and_their_own_keys_override_common_ones() -> None:
     found = parse(TWO + "[damper]\ndamping = 7.0\n[table]\ndelay = 0.001\n", Path())
     assert found.roles == ("slave.roof", "slave.cellar")
     roof, cellar = found.of("slave.roof"), found.of("slave.cellar")
@@ -49,7 +49,7 @@ def test_named_slaves_come_in_the_order_of_the_file_with_their_own_keys_over_the
     assert roof.of("slave") is roof
 
 
-def test_a_tables_compensator_is_taken_whole() -> None:
+def test_a_slaves_own_compensator_replaces_the_common_one_with_all_its_parameters() -> None:
     text = "[table.compensator]\nkind = 'taylor'\nlead = 0.01\n[slave.a.table.compensator]\nkind = 'none'\n[slave.b]\n"
     found = parse(text, Path())
     assert found.of("slave.a").table.compensator.parameters == {}
@@ -98,7 +98,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("text_and_message", WRONG.values(), ids=WRONG.keys())
-def test_wrong_slaves_are_refused_with_a_sentence(text_and_message: tuple[str, str]) -> None:
+def test_wrong_slaves_are_refused_in_one_sentence(text_and_message: tuple[str, str]) -> None:
     text, message = text_and_message
     with pytest.raises(PlanError, match=message) as error:
         parse(text, Path(), "my.toml")
@@ -139,7 +139,9 @@ OWN = st.fixed_dictionaries(
 
 
 @given(slaves=st.dictionaries(NAMES, OWN, min_size=1, max_size=MOST_SLAVES), mass=st.floats(0.1, 1e4))
-def test_a_plan_with_slaves_survives_its_own_text(slaves: dict[str, Any], mass: float) -> None:
+def test_a_plan_with_slaves_is_the_same_after_being_written_and_read(
+    slaves: dict[str, Any], mass: float
+) -> None:
     structure = {"mass": [1e5] * 3, "stiffness": [1e6] * 3, "damping": [0.0] * 3}
     original = from_tables({"structure": structure, "damper": {"mass": mass}, "slave": slaves}, Path())
     returned = parse(original.toml(), Path())
@@ -152,13 +154,13 @@ def test_a_plan_with_slaves_survives_its_own_text(slaves: dict[str, Any], mass: 
         assert returned.of(roles.slave_role(name)).damper.mass == expected
 
 
-def test_the_digest_tells_the_order_of_slaves_apart() -> None:
+def test_the_digest_depends_on_the_order_of_slaves() -> None:
     tables = two().tables()
     turned = tables | {"slave": dict(reversed(tables["slave"].items()))}
     assert from_tables(turned, Path()).digest() != two().digest()
 
 
-def test_every_slave_gets_what_holds_everywhere() -> None:
+def test_the_ideal_plan_and_common_tables_reach_every_slave() -> None:
     perfect = ideal(two())
     assert all(math.isinf(perfect.of(role).table.frequency) for role in perfect.roles)
     assert perfect.of("slave.roof").damper.mass == 20.0
@@ -217,7 +219,7 @@ def test_a_reality_of_other_slaves_is_refused(text: str, message: str, tmp_path:
         reality_of(text, two(), tmp_path)
 
 
-def test_links_of_several_slaves_draw_on_their_own(tmp_path: Path) -> None:
+def test_links_of_several_slaves_have_different_seeds(tmp_path: Path) -> None:
     real = reality_of("seed = 3\n", two(), tmp_path)
     seeds = [seed_of(real.of(role)) for role in two().roles]
     assert seeds[0] == 3
@@ -227,13 +229,13 @@ def test_links_of_several_slaves_draw_on_their_own(tmp_path: Path) -> None:
 # -- routes -----------------------------------------------------------------------------------------
 
 
-def test_the_routes_of_one_slave_are_not_addressed() -> None:
+def test_the_routes_of_a_single_slave_have_no_address() -> None:
     every = [*said("master", ("slave",)), *heard("slave", ("slave",)), *heard("recorder", ("slave",))]
     assert {route.to for route in every} == {""}
 
 
 @given(count=st.integers(1, MOST_SLAVES))
-def test_what_is_heard_is_said_and_no_slave_hears_another_or_its_commands(count: int) -> None:
+def test_every_received_route_has_a_sender_and_no_slave_receives_anothers_messages(count: int) -> None:
     slaves = tuple(f"slave.s{place}" for place in range(count))
     all_roles = ("master", "recorder", "operator", "observer", *slaves)
     spoken = {route for role in all_roles for route in said(role, slaves)}
@@ -246,7 +248,7 @@ def test_what_is_heard_is_said_and_no_slave_hears_another_or_its_commands(count:
         assert Route("master", transport.TICK) not in own
 
 
-def test_the_recorder_tells_each_laboratory_how_far_it_is() -> None:
+def test_the_recorder_reports_its_progress_to_each_laboratory() -> None:
     packed = pack_nexts({"master": 5, "slave.roof": 7})
     assert [next_of(packed, lab) for lab in ("master", "slave.roof", "slave.other")] == [5, 7, 0]
     for damaged in (b"\xc1", b"\x01", b"\x81\xa6master\xa1x"):  # no msgpack, no table, a text for a number
@@ -277,7 +279,7 @@ def test_a_recording_has_a_topic_per_slave_and_an_array_per_command(tmp_path: Pa
         found.of("slave.x")
 
 
-def test_a_recording_without_a_tick_has_empty_parts(tmp_path: Path) -> None:
+def test_a_recording_without_a_tick_has_empty_columns_for_every_slave(tmp_path: Path) -> None:
     slaves, path = two().roles, tmp_path / "a.mcap"
     recording = Recording(path, "trial", 1, default_topics(slaves), slaves)
     recording.add("event", 0, 0, (0.0, "recorder", "info", "begin", "begun", {}))

@@ -23,14 +23,14 @@ def laboratory(plan: Plan | None = None) -> Laboratory:
 
 
 def events(lab: Laboratory) -> list[tuple[str, str, str]]:
-    """Level, code and text of what was noted."""
+    """The level, the code and the text of every recorded event."""
     return [tuple(values_of(row)[4:7]) for topic, row in lab.outlet._pending if topic == "event"]
 
 
 @pytest.mark.parametrize(
     ("text_of_plan", "expected"), [("[slave.rig]\nclass = 'lab.py:Lab'\n", "warning"), ("", "info")]
 )
-def test_what_is_missing_is_in_the_text_and_a_warning_beside_a_rig(
+def test_a_missing_privilege_is_in_the_text_and_a_warning_with_a_rig(
     text_of_plan: str, expected: str, tmp_path: Path
 ) -> None:
     (tmp_path / "lab.py").write_text("class Lab: ...\n")
@@ -41,7 +41,7 @@ def test_what_is_missing_is_in_the_text_and_a_warning_beside_a_rig(
     assert text.endswith("No priority: ask for it.")
 
 
-def test_rejected_frames_are_told_at_the_end_by_reason() -> None:
+def test_rejected_frames_are_reported_at_the_end_by_reason() -> None:
     lab, rejected = laboratory(), Counter[str]()
     around = Surroundings(lab, NOTHING, rejected, timed=False)
     around.begin()
@@ -50,13 +50,13 @@ def test_rejected_frames_are_told_at_the_end_by_reason() -> None:
     assert ("warning", "rejected", "Frames were rejected: 3 by check, 1 by value.") in events(lab)
 
 
-def test_nothing_is_told_of_a_test_that_never_began() -> None:
+def test_a_test_that_never_began_gives_no_events() -> None:
     lab = laboratory()
     Surroundings(lab, NOTHING, Counter(check=1), timed=True).end(0)
     assert events(lab) == []
 
 
-def test_a_bare_loop_that_gave_nothing_is_no_event(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bare_loop_without_figures_gives_no_event(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(BareLoop, "start", lambda *_: None)
     monkeypatch.setattr(BareLoop, "stop", lambda _: {})
     lab = laboratory()

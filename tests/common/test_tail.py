@@ -1,4 +1,4 @@
-"""A recording that is followed while it grows gives what the reader finds in the whole one."""
+"""A recording that is followed while it grows gives the same data as the reader finds in the complete one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def same(parts: list[Run], whole: Run) -> None:
     assert parts[-1].metadata == whole.metadata
 
 
-def test_what_is_flushed_is_there_at_the_next_look(tmp_path: Path) -> None:
+def test_flushed_samples_are_read_at_the_next_look(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     with Tail(path) as tail:
         assert not tail.look().columns
@@ -83,7 +83,7 @@ def grown(path: Path, data: bytes, cuts: list[int], most: int) -> tuple[list[Run
     return parts, tail
 
 
-def test_it_may_grow_byte_by_byte(recorded: bytes, tmp_path: Path) -> None:
+def test_a_recording_that_grows_byte_by_byte_is_read_completely(recorded: bytes, tmp_path: Path) -> None:
     end = recorded.index(b"completed")  # of the summary, behind the last chunk
     cuts = sorted({*range(end - 3_000, end + 100), *range(len(recorded) - 300, len(recorded))})
     parts, tail = grown(tmp_path / "growing.mcap", recorded, cuts, 1 << 20)
@@ -94,7 +94,7 @@ def test_it_may_grow_byte_by_byte(recorded: bytes, tmp_path: Path) -> None:
 
 
 @given(data=st.data(), most=st.integers(1, 20_000))
-def test_it_may_grow_in_any_pieces_and_be_read_in_any(
+def test_a_recording_that_grows_and_is_read_in_any_pieces_is_read_completely(
     recorded: bytes, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject, most: int
 ) -> None:
     cuts = sorted(data.draw(st.lists(st.integers(0, len(recorded)), max_size=8)))
@@ -105,7 +105,9 @@ def test_it_may_grow_in_any_pieces_and_be_read_in_any(
     same(parts, read(folder / "whole.mcap"))
 
 
-def test_a_look_at_much_is_bounded_and_says_that_there_is_more(recorded: bytes, tmp_path: Path) -> None:
+def test_one_look_reads_a_bounded_amount_and_reports_that_more_is_waiting(
+    recorded: bytes, tmp_path: Path
+) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(recorded)
     with Tail(path) as tail:
@@ -120,7 +122,7 @@ def test_a_look_at_much_is_bounded_and_says_that_there_is_more(recorded: bytes, 
 
 
 @given(place=st.floats(0.0, 1.0), flip=st.integers(1, 255))
-def test_damage_ends_it_with_what_came_before(
+def test_reading_ends_at_damage_and_keeps_the_samples_before_it(
     recorded: bytes, tmp_path_factory: pytest.TempPathFactory, place: float, flip: int
 ) -> None:
     path = tmp_path_factory.mktemp("tail") / "damaged.mcap"
@@ -139,7 +141,7 @@ def test_damage_ends_it_with_what_came_before(
     assert sequences == list(range(len(sequences)))
 
 
-def test_a_damaged_chunk_is_named_by_its_place(recorded: bytes, tmp_path: Path) -> None:
+def test_a_damaged_chunk_is_named_by_its_position(recorded: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     with path.open("wb") as stream, Tail(path) as tail:
         half = len(recorded) // 2
@@ -151,7 +153,7 @@ def test_a_damaged_chunk_is_named_by_its_place(recorded: bytes, tmp_path: Path) 
         assert not tail.finished
 
 
-def test_a_file_that_is_begun_anew_is_no_longer_the_same(recorded: bytes, tmp_path: Path) -> None:
+def test_a_file_that_is_replaced_while_followed_is_reported(recorded: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(recorded[:20_000])
     with Tail(path) as tail:
@@ -161,7 +163,9 @@ def test_a_file_that_is_begun_anew_is_no_longer_the_same(recorded: bytes, tmp_pa
 
 
 @pytest.mark.parametrize("content", [b"no recording at all", b"\x89"])
-def test_what_is_no_recording_is_said_in_one_sentence(content: bytes, tmp_path: Path) -> None:
+def test_a_followed_file_that_is_not_a_recording_is_refused_in_one_sentence(
+    content: bytes, tmp_path: Path
+) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(content)
     with Tail(path) as tail:
@@ -172,6 +176,6 @@ def test_what_is_no_recording_is_said_in_one_sentence(content: bytes, tmp_path: 
             tail.look()
 
 
-def test_a_folder_is_no_recording(tmp_path: Path) -> None:
+def test_a_folder_is_refused_as_a_recording(tmp_path: Path) -> None:
     with Tail(tmp_path) as tail, pytest.raises(InputError, match="Cannot read the recording"):
         tail.look()

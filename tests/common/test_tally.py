@@ -8,7 +8,7 @@ from common.protocol.tally import Tally
 TICKS, WINDOW = 200, 50
 
 
-def test_what_is_not_fresh_is_turned_away_with_its_reason() -> None:
+def test_a_message_that_is_not_fresh_is_rejected_with_its_reason() -> None:
     tally = Tally(TICKS, WINDOW)
     assert tally.admit(10, expected=10)
     for seq, expected, reason in (
@@ -34,7 +34,7 @@ def test_what_is_not_fresh_is_turned_away_with_its_reason() -> None:
         max_size=150,
     )
 )
-def test_every_number_has_one_fate_and_what_is_admitted_only_goes_up(
+def test_every_sequence_number_is_counted_once_and_admitted_numbers_increase(
     frames: list[tuple[int, int, str]],
 ) -> None:
     tally, admitted, used, lost, seen = Tally(TICKS, WINDOW), [], set(), set(), set()

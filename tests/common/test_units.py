@@ -1,4 +1,4 @@
-"""Numbers with units in plans: the value in SI, to the last bit, and sentences for what does not fit."""
+"""Numbers with units in plans give their SI value to the last bit; wrong ones are refused in one sentence."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ KNOWN = [
 
 
 @pytest.mark.parametrize(("text", "unit", "value"), KNOWN)
-def test_a_text_is_its_value_in_si_to_the_last_bit(text: str, unit: str, value: float) -> None:
+def test_a_number_with_a_unit_gives_its_si_value_to_the_last_bit(text: str, unit: str, value: float) -> None:
     assert in_si(text, unit, "x") == value
 
 
@@ -53,14 +53,14 @@ def test_a_text_is_its_value_in_si_to_the_last_bit(text: str, unit: str, value: 
         ("1 t; import os", "kg", "x has the unit 't; import os', which is not known: give it in kg."),
     ],
 )
-def test_what_does_not_fit_is_refused_with_the_unit_that_does(text: str, unit: str, sentence: str) -> None:
+def test_a_wrong_unit_is_refused_and_a_fitting_one_is_named(text: str, unit: str, sentence: str) -> None:
     with pytest.raises(PlanError) as caught:
         in_si(text, unit, "x")
     assert str(caught.value) == sentence
 
 
 @given(st.text(max_size=80), st.sampled_from(["", "m", "kg", "N·s/m"]))
-def test_any_text_is_a_number_or_one_sentence(text: str, unit: str) -> None:
+def test_any_text_gives_a_number_or_one_sentence(text: str, unit: str) -> None:
     try:
         value = in_si(text, unit, "x")
     except PlanError as error:
@@ -69,7 +69,7 @@ def test_any_text_is_a_number_or_one_sentence(text: str, unit: str) -> None:
         assert isinstance(value, float)
 
 
-def test_a_plan_with_units_is_the_plan_without(tmp_path: Path) -> None:
+def test_a_plan_with_units_equals_the_plan_in_si_numbers(tmp_path: Path) -> None:
     plain = """
         [test]
         interval = 0.002
@@ -93,6 +93,6 @@ def test_a_plan_with_units_is_the_plan_without(tmp_path: Path) -> None:
     assert parse(units, tmp_path).digest() == parse(plain, tmp_path).digest()
 
 
-def test_a_models_own_parameter_takes_its_unit(tmp_path: Path) -> None:
+def test_a_parameter_of_a_users_model_accepts_its_unit(tmp_path: Path) -> None:
     text = '[structure.columns]\nmodel = "bilinear"\nyield_displacement = "4 mm"\nhardening = 0.1\n'
     assert parse(text, tmp_path).structure.columns.parameters["yield_displacement"] == 0.004

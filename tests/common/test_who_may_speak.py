@@ -1,4 +1,4 @@
-"""Who may say what, on which channel and under which key."""
+"""Which role may send which message, on which channel and under which key."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tests.common.test_codec import COMMAND, KEY
 
 
 @pytest.mark.parametrize(("channels", "heard"), [(4, True), (2, False)])
-def test_a_feedback_has_as_many_channels_as_its_slave(channels: int, heard: bool) -> None:
+def test_a_feedback_must_have_as_many_channels_as_its_slave(channels: int, heard: bool) -> None:
     master = end()
     master.endpoint.expect({SLAVE: 4})
     frame = encode(FEEDBACK._replace(measured=FEEDBACK.measured[:channels]), KEY)
@@ -37,13 +37,13 @@ def test_a_feedback_has_as_many_channels_as_its_slave(channels: int, heard: bool
     assert master.endpoint.rejected == ({} if heard else {"fields": 1})
 
 
-def test_every_kind_is_spoken_by_somebody() -> None:
+def test_every_kind_of_message_has_a_sender() -> None:
     assert frozenset().union(*SPOKEN.values()) == set(MESSAGES)
 
 
 @pytest.mark.parametrize("role", [MASTER, SLAVE, RECORDER, "operator", "stranger"])
 @pytest.mark.parametrize("channel", [TICK, CONTROL, SAMPLES])
-def test_what_a_role_does_not_say_on_a_channel_is_not_heard(role: str, channel: str) -> None:
+def test_a_message_that_a_role_may_not_send_on_a_channel_is_rejected(role: str, channel: str) -> None:
     other = end()
     for kind in MESSAGES:
         session = 0 if kind is Recorder else SESSION
@@ -59,21 +59,21 @@ def test_what_a_role_does_not_say_on_a_channel_is_not_heard(role: str, channel: 
     assert other.endpoint.rejected == {"kind_not_allowed": expected}
 
 
-def test_a_named_slave_speaks_as_a_slave() -> None:
+def test_a_named_slave_may_send_what_a_slave_may_send() -> None:
     master = end()
     assert master.hears("slave.roof", TICK, encode(FEEDBACK, KEY)) == FEEDBACK
     assert master.hears("slave.roof", TICK, GOOD) is None
     assert master.endpoint.rejected == {"kind_not_allowed": 1}
 
 
-def test_nobody_speaks_for_another() -> None:
+def test_a_message_in_the_name_of_another_role_is_rejected() -> None:
     recorder = end()
     assert recorder.hears(MASTER, SAMPLES, encode(Samples(SESSION, SLAVE, 0, b""), KEY)) is None
     assert recorder.hears("slave.roof", CONTROL, encode(Trip(SESSION, "slave.cellar", "", ""), KEY)) is None
     assert recorder.endpoint.rejected == {"sender": 2}
 
 
-def test_within_a_session_only_what_must_be_open_comes_under_the_key_that_all_share() -> None:
+def test_within_a_session_only_the_messages_that_need_it_are_accepted_under_the_shared_key() -> None:
     shared = session_key(0, "")
     keyed: list[tuple[Message, str]] = [
         (Start(SESSION, 1, 1), MASTER),
@@ -100,7 +100,7 @@ def test_within_a_session_only_what_must_be_open_comes_under_the_key_that_all_sh
             assert end(session).hears(role, CONTROL, encode(message, shared)) == message
 
 
-def test_who_has_no_session_is_not_disturbed_by_those_of_others() -> None:
+def test_an_endpoint_without_a_session_ignores_the_messages_of_other_sessions() -> None:
     idle = end(session=0)
     for channel, message in ((TICK, COMMAND), (CONTROL, Stop(SESSION, 1, ""))):
         assert idle.hears(MASTER, channel, encode(message, KEY)) is None
@@ -110,7 +110,7 @@ def test_who_has_no_session_is_not_disturbed_by_those_of_others() -> None:
     assert idle.endpoint.rejected["open_key"] == 1
 
 
-def test_what_is_sent_is_under_the_sessions_key_but_for_what_must_be_open() -> None:
+def test_messages_are_sent_under_the_sessions_key_except_those_that_need_the_shared_one() -> None:
     for message, keyed in (
         (Stop(SESSION, 1, ""), True),
         (Registered(SESSION, 1), True),

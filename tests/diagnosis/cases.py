@@ -1,4 +1,4 @@
-"""Recordings of laboratories whose secrets are known, made in virtual time, each once per session."""
+"""Recordings of laboratories whose hidden effects are known, each made once per session in virtual time."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def short(duration: float = SECONDS, **test: Any) -> Plan:
 
 
 def jitter(seed: int) -> dict[str, float]:
-    """How far each nominal parameter is off, in tolerances."""
+    """The error of each nominal parameter, in tolerances."""
     draws = np.random.default_rng(seed).normal(0.0, 0.7, len(JITTERED)).clip(-1.5, 1.5)
     return {f"{table}.{field}": float(draw) for (table, field), draw in zip(JITTERED, draws, strict=True)}
 
@@ -61,7 +61,7 @@ def tables(base: Plan, effects: Effects, off: Mapping[str, float], seed: int) ->
 
 
 def play(base: Plan, given: Mapping[str, Any], path: Path) -> RthsError | None:
-    """Record the test of a plan in laboratories that are what `given` says; the error that ended it."""
+    """Record the test of a plan in the laboratories of the reality `given`; returns the error that ended it."""
     true = reality.from_reality(dict(given), base, Path())
     return virtual.run(virtual.assemble(base, true, path), lambda: "")
 
@@ -79,7 +79,7 @@ def lab_b(whole: Record) -> LaboratoryPart:
 
 
 class Cases:
-    """Recordings and reports, each made when it is asked for first."""
+    """Recordings and reports, each made at its first request."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -89,7 +89,7 @@ class Cases:
     def file(
         self, effects: Effects | None = None, seed: int = 1, duration: float = SECONDS, scale: float = 0.1
     ) -> Path:
-        """The recording of a case; `seed` draws noise and how far the nominal parameters are off, 0 for not."""
+        """The recording of a case; `seed` draws the noise and the errors of the nominal parameters (0: no errors)."""
         chosen = effects or {}
         key = (repr(chosen), seed, duration, scale)
         if key not in self._files:
@@ -124,12 +124,12 @@ def counts_as(report: Mapping[str, Any], effect: str) -> bool:
 
 
 def estimate(report: Mapping[str, Any], effect: str, parameter: str) -> float:
-    """The parameter that a verdict gives."""
+    """The estimate of a parameter in a verdict."""
     return float(report["which"][0]["parameters"][effect][parameter]["value"])
 
 
 def away(effect: str, parameter: str, value: float) -> float:
-    """A parameter's distance from where the effect is not there."""
+    """The distance of a parameter from the value at which its effect vanishes."""
     null = next(item.null for item in CATALOGUE[effect].parameters if item.name == parameter)
     return value - null if np.isfinite(null) else value
 

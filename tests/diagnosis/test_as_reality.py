@@ -1,4 +1,4 @@
-"""What was found, written as a reality and read again, is the same laboratories to the last bit."""
+"""A diagnosis that is written as a reality and read again gives the same laboratories to the last bit."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_a_diagnosis_read_as_a_reality_is_the_same_laboratories(cases: Cases, tm
     assert true_slaves(truth)["slave"].plan.table == systems["slave"].plan.table != plan_of(path).table
 
 
-def test_laws_are_read_from_the_file_beside(tmp_path: Path) -> None:
+def test_learned_laws_are_read_from_the_file_next_to_the_reality(tmp_path: Path) -> None:
     law = np.linspace(0.1, 1.0, 7)
     with (tmp_path / "found.npz").open("wb") as file:
         np.savez(file, **{"master.column": law})  # type: ignore[arg-type]
@@ -83,7 +83,9 @@ def test_laws_are_read_from_the_file_beside(tmp_path: Path) -> None:
         ({"laboratory": "master", "machine": "column", "file": "text.npz"}, "Cannot read the law"),
     ],
 )
-def test_a_wrong_law_is_one_sentence(row: dict[str, str], says: str, tmp_path: Path) -> None:
+def test_a_wrong_learned_law_is_refused_in_one_sentence(
+    row: dict[str, str], says: str, tmp_path: Path
+) -> None:
     with (tmp_path / "f.npz").open("wb") as file:
         np.savez(file, **{"master.column": np.array([1.0, np.nan])})  # type: ignore[arg-type]
     (tmp_path / "text.npz").write_text("no archive", encoding="utf-8")
@@ -91,14 +93,14 @@ def test_a_wrong_law_is_one_sentence(row: dict[str, str], says: str, tmp_path: P
         reality.from_reality({"learned": [row]}, short(), tmp_path)
 
 
-def test_motion_and_control_may_differ_and_models_may_not() -> None:
+def test_a_reality_fits_a_plan_with_another_motion_or_compensator_but_not_with_other_models() -> None:
     plan = short()
     assert models_of(plan) == models_of(short(duration=3.0, scale=0.7))
     assert models_of(plan) == models_of(replace(plan, compensator=CompensatorTable("none", {})))
     assert models_of(plan) != models_of(replace(plan, table=replace(plan.table, frequency=9.0)))
 
 
-def test_only_what_differs_is_written() -> None:
+def test_a_reality_contains_only_the_keys_that_differ_from_the_plan() -> None:
     planned = {"a": {"x": 1.0, "in": {"y": 2.0, "z": 3.0}}, "b": {"x": 1.0}}
     real = {"a": {"x": 1.0, "in": {"y": 2.5, "z": 3.0}}, "b": {"x": 1.0}}
     assert changed(planned, real, ("a", "b")) == {"a": {"in": {"y": 2.5}}}

@@ -1,4 +1,4 @@
-"""Bands hold as often as they should: known causes are fitted, the next test is predicted and then run."""
+"""Prediction bands cover as often as stated: known causes are fitted, the next test is predicted and then run."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ STANDING_IN = {
 
 
 class Outcome(NamedTuple):
-    """How a prediction came out."""
+    """How a prediction compares with the test."""
 
     inside: float  # share of the time, over all signals
     ratio: float  # error after over error before
@@ -85,7 +85,7 @@ def recorded(plan: Plan, truth: Reality, path: Path) -> Path:
 
 
 def fitted(path: Path, effects: Effects) -> Diagnosis:
-    """What a fit of known causes finds, without any search."""
+    """The fit of known causes, without a search."""
     shown = record.build(read(path))
     verdicts = []
     for part in parts_of(shown):
@@ -135,14 +135,14 @@ def play(case: Case, seed: int, folder: Path) -> Outcome:
     return Outcome(held.held(read(played), read(folder / "next.mcap")).inside, after / before)
 
 
-def test_a_band_holds_what_it_says_where_the_cause_was_found(tmp_path: Path) -> None:
+def test_a_prediction_band_covers_its_stated_share_where_the_cause_was_found(tmp_path: Path) -> None:
     outcome = play(FOUND["actuator delay, half"], 5, tmp_path)
     assert 0.85 <= outcome.inside <= 0.95
     assert outcome.ratio < 0.1
 
 
 @pytest.mark.slow
-def test_bands_over_causes_and_tests_hold_what_they_say(tmp_path: Path) -> None:
+def test_prediction_bands_cover_their_stated_share_over_causes_and_tests(tmp_path: Path) -> None:
     found = [play(case, seed, tmp_path) for seed, case in enumerate(FOUND.values(), 3)]
     others = [play(case, seed, tmp_path) for seed, case in enumerate(STANDING_IN.values(), 8)]
     assert 0.85 <= np.mean([one.inside for one in (*found, *others)]) <= 0.95

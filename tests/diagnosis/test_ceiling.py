@@ -1,4 +1,4 @@
-"""What a flexible model explains: known causes nearly wholly, noise not at all."""
+"""A flexible model explains known causes almost completely and noise not at all."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ T: Array = np.arange(N, dtype=np.float64) * H
 
 
 def split(n: int, interval: float) -> tuple[Mask, Mask]:
-    """What fits see and what they do not."""
+    """The samples for fitting and the withheld ones."""
     held = withheld_ticks(n, interval)
     return ~held, held
 
@@ -61,7 +61,7 @@ CAUSES: dict[str, Callable[[Array], Array]] = {
 
 @pytest.mark.parametrize("cause", CAUSES)
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_known_causes_are_explained(cause: str, seed: int) -> None:
+def test_a_flexible_model_explains_known_causes(cause: str, seed: int) -> None:
     x, random = drive(seed), np.random.default_rng(100 + seed)
     wanted = CAUSES[cause](x)
     residual = 3.0 * wanted / wanted.std() + random.standard_normal(N)
@@ -71,7 +71,7 @@ def test_known_causes_are_explained(cause: str, seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("level", [1.0, 1.1])
-def test_noise_is_not_explained(seed: int, level: float) -> None:
+def test_a_flexible_model_does_not_explain_noise(seed: int, level: float) -> None:
     residual = level * np.random.default_rng(1000 + seed).standard_normal(N)
     inputs = np.column_stack([drive(seed), drive(seed + 50)])
     assert ceiling(inputs, residual, *split(N, H), 1.0, H) < 0.1
@@ -79,18 +79,18 @@ def test_noise_is_not_explained(seed: int, level: float) -> None:
     assert all(share < 0.1 for _, share in depends_on(coordinates, residual, 1.0))
 
 
-def test_what_was_not_measured_is_not_explained() -> None:
+def test_a_residual_of_an_unmeasured_input_is_not_explained() -> None:
     residual = 3.0 * drive(9) + np.random.default_rng(0).standard_normal(N)
     assert ceiling(drive(10), residual, *split(N, H), 1.0, H) < 0.15
 
 
-def test_masks_that_leave_nothing_are_refused() -> None:
+def test_masks_that_leave_no_samples_are_refused() -> None:
     none = np.zeros(N, dtype=bool)
     with pytest.raises(InputError):
         ceiling(drive(1), drive(2), none, ~none, 1.0, H)
 
 
-def test_a_constant_input_does_no_harm() -> None:
+def test_a_constant_input_explains_a_constant_residual() -> None:
     residual = 3.0 + np.random.default_rng(0).standard_normal(N)
     assert ceiling(np.ones((N, 2)), residual, *split(N, H), 1.0, H) > 0.9
 
@@ -111,7 +111,7 @@ def test_the_coordinate_on_which_a_residual_depends_is_named(cause: str, first: 
     assert found[1][1] < 0.5
 
 
-def test_withheld_seconds_part_the_record() -> None:
+def test_withheld_seconds_divide_the_record() -> None:
     train, held = split(20_000, H)
     assert np.array_equal(train, ~held)
     assert held.mean() == pytest.approx(0.4)
@@ -120,7 +120,7 @@ def test_withheld_seconds_part_the_record() -> None:
 
 
 @pytest.mark.parametrize("n", [17, 1000, 1501])
-def test_short_records_are_parted_too(n: int) -> None:
+def test_short_records_are_divided_for_withheld_data(n: int) -> None:
     train, held = split(n, H)
     assert train.any()
     assert 0.2 <= held.mean() <= 0.6

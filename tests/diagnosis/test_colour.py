@@ -1,4 +1,4 @@
-"""Noise of any colour: what whitens it, what lines and spikes it has, and what its model costs a gap."""
+"""Coloured noise: its model, its spectral lines and spikes, and the effect of the model on a gap."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def whitened(noise: Array, known: list[Array]) -> tuple[Array, NoiseModel]:
 
 
 @pytest.mark.parametrize("name", COLOURS)
-def test_noise_of_any_colour_is_no_gap(name: str) -> None:
+def test_noise_of_any_colour_does_not_count_as_a_gap(name: str) -> None:
     noise = averaged(without_spikes(COLOURS[name]))
     flat, model = whitened(noise, [noise[:500], noise[1500:2000]])
     assert gap(flat, GROUP, model).significance < 5.0
@@ -74,7 +74,7 @@ def test_noise_of_any_colour_is_no_gap(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["50 Hz", "AR(1)", "pink"])
-def test_what_moves_stands_out_of_coloured_noise(name: str) -> None:
+def test_a_motion_is_significant_in_coloured_noise(name: str) -> None:
     noise = averaged(COLOURS[name])
     t = np.arange(noise.size) * INTERVAL * GROUP
     moving = np.where(t > 10.0, 2.5 * np.std(noise), 0.0) * np.sin(2.0 * np.pi * 3.0 * t)
@@ -82,7 +82,7 @@ def test_what_moves_stands_out_of_coloured_noise(name: str) -> None:
     assert gap(found, GROUP, model).significance > 10.0
 
 
-def test_a_model_is_the_one_that_made_the_noise() -> None:
+def test_the_noise_model_recovers_the_filter_that_made_the_noise() -> None:
     made = np.array([1.0, -1.2, 0.6])
     model = colour.autoregression([np.asarray(signal.lfilter([1.0], made, white(7, 4000)))], careful=True)
     assert model.weights == pytest.approx(made, abs=0.05)
@@ -90,7 +90,7 @@ def test_a_model_is_the_one_that_made_the_noise() -> None:
     assert colour.autoregression([white(8, 4000)], careful=True).order == 0
 
 
-def test_lines_of_constant_amplitude_are_pickup_and_those_of_a_motion_are_not() -> None:
+def test_spectral_lines_of_constant_amplitude_count_as_pickup_and_those_of_a_motion_do_not() -> None:
     t = np.arange(TICKS) * INTERVAL
     hum = 0.5 * np.sin(2.0 * np.pi * 50.01 * t) + 0.2 * np.sin(2.0 * np.pi * 150.0 * t)
     found = pickup.pickups(white(9, TICKS) + hum, INTERVAL)
@@ -102,7 +102,7 @@ def test_lines_of_constant_amplitude_are_pickup_and_those_of_a_motion_are_not() 
     assert pickup.pickups(white(9, TICKS) + 3.0 * burst, INTERVAL) == []
 
 
-def test_lines_that_several_readings_show_are_a_motion_but_for_those_of_the_mains() -> None:
+def test_lines_in_several_readings_count_as_motion_except_those_at_mains_frequency() -> None:
     t = np.arange(TICKS) * INTERVAL
     line, hum = np.sin(2.0 * np.pi * 12.4 * t), np.sin(2.0 * np.pi * 50.0 * t)
     both = np.column_stack([white(31, TICKS) + line + hum, white(32, TICKS) + 0.4 * line + hum])
@@ -113,7 +113,7 @@ def test_lines_that_several_readings_show_are_a_motion_but_for_those_of_the_main
         assert [round(item.frequency, 1) for item in moving] == expected
 
 
-def test_single_samples_are_spikes_and_what_moves_is_none() -> None:
+def test_single_samples_count_as_spikes_and_a_motion_does_not() -> None:
     noise = white(10, 3000)
     struck = noise.copy()
     struck[[500, 900, 1400]] += 30.0
@@ -123,7 +123,7 @@ def test_single_samples_are_spikes_and_what_moves_is_none() -> None:
     assert not spikes(low_passed(50.0)).any()
 
 
-def test_what_follows_from_the_inputs_is_foreseen_and_noise_is_not() -> None:
+def test_the_part_that_follows_from_the_inputs_is_predicted_and_noise_is_not() -> None:
     drive = np.asarray(signal.lfilter([1.0], [1.0, -1.95, 0.96], white(11, 2500)))
     x = features(drive[:, None], 0.008, np.ones(2500, dtype=bool), timeless=True)
     rubbing = 2.0 * np.std(drive) * np.sign(np.gradient(drive))

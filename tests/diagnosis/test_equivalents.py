@@ -1,4 +1,4 @@
-"""Effects that the data cannot tell apart: every name counts once."""
+"""Effects that the data cannot tell apart; every name counts once."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def search(*others: Fit) -> Search:
     return Search(DATA, fit("", 9.0), fit("ab", 0.0), others)
 
 
-def test_an_effect_that_could_stand_for_two_is_counted_where_it_agrees_best() -> None:
+def test_an_effect_that_is_equivalent_to_two_counts_for_the_one_that_it_matches_best() -> None:
     assert equivalents(search(fit("cb", 0.2), fit("ac", 0.1), fit("db", 0.1))) == (("b", "c"), ("a", "d"))
 
 
-def test_two_forms_of_an_effect_are_one_name() -> None:
+def test_two_forms_of_an_effect_count_as_one_name() -> None:
     assert equivalents(search(fit("cb", 0.2), fit("cb", 0.1))) == (("a", "c"),)
 
 
-def test_an_effect_that_fits_worse_is_no_equivalent() -> None:
+def test_an_effect_that_fits_worse_is_not_equivalent() -> None:
     worse = fit("cb", 0.0)
     assert equivalents(search(Fit(DATA, worse.values, worse.z, NOISY + 0.2))) == ()

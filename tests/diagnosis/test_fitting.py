@@ -1,4 +1,4 @@
-"""Fits: what a laboratory's parameters are, its noise, slopes, and the beginning of a test."""
+"""Fits of a laboratory's parameters and noise, their derivatives, and the choice of the beginning of a test."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def found_z(fit: Fit) -> dict[str, float]:
         ),
     ],
 )
-def test_commissioning_finds_what_the_laboratories_are(
+def test_commissioning_finds_the_parameters_of_the_laboratories(
     cases: Cases, kind: str, sharp: Mapping[str, float], seed: int
 ) -> None:
     fit = fitting.fit(data_of(cases, kind, seed=seed), {})
@@ -74,7 +74,7 @@ def test_commissioning_finds_what_the_laboratories_are(
     assert 0.5 < fit.chi / fit.reduced.size < 1.15  # nothing is left but noise, of which σ holds more
 
 
-def test_commissioning_finds_what_the_building_is(tmp_path: Path) -> None:
+def test_commissioning_finds_the_parameters_of_the_building(tmp_path: Path) -> None:
     off = {"structure.mass": 1.0, "structure.stiffness": -0.8, "structure.damping": 0.5}
     base = short(6.0)
     made.play(base, made.tables(base, {}, off, 1), tmp_path / "a.mcap")
@@ -86,14 +86,14 @@ def test_commissioning_finds_what_the_building_is(tmp_path: Path) -> None:
     )
 
 
-def test_a_laboratory_that_is_as_planned_stays_there(cases: Cases) -> None:
+def test_a_laboratory_as_planned_is_fitted_with_the_planned_parameters(cases: Cases) -> None:
     for kind in ("a", "b"):
         fit = fitting.fit(data_of(cases, kind, seed=0), {})
         assert np.max(np.abs(fit.z)) < 0.3
 
 
 @pytest.mark.parametrize("kind", ["a", "b"])
-def test_the_noise_is_found(cases: Cases, kind: str, default_plan: Plan) -> None:
+def test_the_noise_levels_are_estimated(cases: Cases, kind: str, default_plan: Plan) -> None:
     data = data_of(cases, kind)
     planned = [getattr(default_plan.sensors, name) for name in data.part.signals]
     assert data.white == pytest.approx(planned, rel=0.08)
@@ -102,7 +102,7 @@ def test_the_noise_is_found(cases: Cases, kind: str, default_plan: Plan) -> None
     assert np.all(data.sigma <= data.white + 1.01 * MODEL_ERROR * level)
 
 
-def test_noise_of_white_noise_over_anything_smooth() -> None:
+def test_the_noise_estimate_ignores_a_smooth_signal() -> None:
     t = np.arange(5000) * 0.002
     smooth = np.stack([1e3 * np.sin(2 * np.pi * 3 * t), 50 * t**2], axis=1)
     assert residuals.noise(smooth + 0.1 * white(0, 5000, 2)) == pytest.approx([0.1, 0.1], rel=0.05)
@@ -119,7 +119,7 @@ def test_residuals_of_white_noise_have_unit_variance(cases: Cases) -> None:
     assert np.mean(reduced**2, axis=0) == pytest.approx(np.ones(4), abs=0.15)
 
 
-def test_what_is_missing_does_not_count(cases: Cases) -> None:
+def test_missing_samples_do_not_count_in_the_residual(cases: Cases) -> None:
     data = data_of(cases, "a")
     part = data.part
     assert isinstance(part, LaboratoryPart)
@@ -152,7 +152,9 @@ def differences(fit: Fit, place: int, step: float) -> Array:
         ("building", {"structure.damping": {"factor": 1.2}}),
     ],
 )
-def test_slopes_are_those_of_finer_differences(cases: Cases, kind: str, values: hypothesis.Values) -> None:
+def test_derivatives_agree_with_those_of_finer_differences(
+    cases: Cases, kind: str, values: hypothesis.Values
+) -> None:
     data = data_of(cases, kind, duration=4.0)
     fit = fitting.at(data, values, np.zeros(len(data.part.nuisances)))
     assert fit.jacobian.shape == (fit.reduced.size, fit.z.size + len(values))
@@ -162,7 +164,7 @@ def test_slopes_are_those_of_finer_differences(cases: Cases, kind: str, values: 
         assert off < 0.12, place
 
 
-def test_a_beginning_holds_most_of_what_is_left(cases: Cases) -> None:
+def test_a_fit_uses_the_beginning_of_a_test_that_holds_most_of_the_residual(cases: Cases) -> None:
     data = data_of(cases, "a", duration=12.0)
     fit = at_nominal(data)
     early = np.zeros_like(fit.reduced)
@@ -179,12 +181,12 @@ def test_a_beginning_holds_most_of_what_is_left(cases: Cases) -> None:
     assert fitting.beginning(short_, at_nominal(short_), 0.1) is short_
 
 
-def test_a_building_is_always_judged_whole(cases: Cases) -> None:
+def test_a_building_is_always_judged_over_the_whole_test(cases: Cases) -> None:
     data = data_of(cases, "building", duration=12.0)
     assert fitting.beginning(data, at_nominal(data), 0.01) is data
 
 
-def test_a_model_that_the_plan_cannot_have_is_far_off(cases: Cases) -> None:
+def test_a_model_that_the_plan_cannot_have_gets_a_large_residual(cases: Cases) -> None:
     data = data_of(cases, "a", duration=4.0)
     wrong = System(dataclasses.replace(data.system.plan, column=None))  # type: ignore[arg-type]
     with pytest.raises(AttributeError):
@@ -194,7 +196,7 @@ def test_a_model_that_the_plan_cannot_have_is_far_off(cases: Cases) -> None:
 
 
 @given(st.sampled_from(sorted(CATALOGUE)), st.floats(0.01, 0.99))
-def test_parameters_go_in_and_out_of_a_fit(name: str, share: float) -> None:
+def test_the_transformation_of_fitted_parameters_is_inverted_exactly(name: str, share: float) -> None:
     effect = CATALOGUE[name]
     values = {item.name: item.sizes[0] if item.sizes else item.least for item in effect.parameters}
     for item in hypothesis.free(effect, values):
@@ -207,14 +209,14 @@ def test_parameters_go_in_and_out_of_a_fit(name: str, share: float) -> None:
             assert item.inward(item.outward(inside)) == pytest.approx(inside, rel=1e-6, abs=1e-6)
 
 
-def test_withheld_time_is_in_blocks_of_a_second(cases: Cases) -> None:
+def test_withheld_time_consists_of_blocks_of_one_second(cases: Cases) -> None:
     data = data_of(cases, "a")
     seconds = data.train[: 10 * 125].reshape(10, 125)
     assert all(block.all() or not block.any() for block in seconds)
     assert [bool(block[0]) for block in seconds] == [True, True, False, True, False] * 2
 
 
-def test_each_storey_of_the_building_may_be_off_by_itself() -> None:
+def test_each_storeys_parameters_are_fitted_separately() -> None:
     text = "[structure]\nmass = [1e5, 2e5]\nstiffness = [3e7, 2e7]\ndamping_ratio = 0.05\n"
     plan = plans.parse(text, Path())
     found = {item.name: item for item in of_building(plan)}

@@ -1,4 +1,4 @@
-"""How far the gap closes once the right effect is added, on data that no fit has seen."""
+"""How far the gap closes when the right effect is added, judged on data that were not used for fitting."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_the_right_effect_closes_the_gap_down_to_the_noise(cases: Cases, kind: s
     assert far["judged_on"] == "interleaved (interpolation)"
 
 
-def test_the_waterfall_goes_down_site_by_site(cases: Cases) -> None:
+def test_the_waterfall_decreases_site_by_site(cases: Cases) -> None:
     report = cases.report(FOUND["two"])
     steps = report["details"]["waterfall"]
     assert [step["label"] for step in steps[:2]] == ["nominal models", "parameters within tolerances"]
@@ -50,7 +50,7 @@ def test_the_waterfall_goes_down_site_by_site(cases: Cases) -> None:
     assert {step["label"] for step in steps[2:-1]} == {"+ column.friction", "+ damper.friction"}
 
 
-def test_tolerances_alone_are_no_gap_but_stand_beside_it(cases: Cases) -> None:
+def test_tolerances_alone_are_not_a_gap_and_are_reported_separately(cases: Cases) -> None:
     report = cases.report(seed=3)
     far = report["how_far"]
     assert far["nominal"] > far["before"]
@@ -71,7 +71,7 @@ def test_shares_of_two_sites_sum_to_one(cases: Cases) -> None:
     assert sum(row["shapley"] for row in rows) == pytest.approx(closed - report["how_far"]["after"], rel=0.35)
 
 
-def test_another_recording_of_the_laboratories_judges(cases: Cases) -> None:
+def test_another_recording_of_the_same_laboratories_is_used_to_judge_the_gap(cases: Cases) -> None:
     effects = FOUND["column"]
     other = cases.file(effects, scale=0.15, duration=8.0)
     far = diagnose_file(cases.file(effects), validate=[other]).how_far.plain()
@@ -81,7 +81,7 @@ def test_another_recording_of_the_laboratories_judges(cases: Cases) -> None:
     assert far["nominal"] > 0.0
 
 
-def test_a_recording_of_other_laboratories_is_not_closed(cases: Cases) -> None:
+def test_the_gap_on_a_recording_of_other_laboratories_is_not_closed(cases: Cases) -> None:
     wrong = cases.file({"table.gain": {"factor": 0.93}}, scale=0.15, duration=8.0)
     far = diagnose_file(cases.file(FOUND["column"]), validate=[wrong]).how_far
     assert far.closed is not None
@@ -122,7 +122,7 @@ def test_a_falsified_reading_counts_once_in_the_noise_floor(cases: Cases, effect
     assert far["after"] == pytest.approx(far["noise_floor"], rel=0.15)  # counted twice it is 0.26
 
 
-def test_withheld_time_is_a_good_part_of_the_test(cases: Cases) -> None:
+def test_withheld_time_is_between_15_and_60_percent_of_the_test(cases: Cases) -> None:
     mask = gaps.held_out(cases.record())
     assert 0.15 < np.mean(mask) < 0.6
     assert not mask.all()
@@ -135,7 +135,7 @@ def test_the_closed_share_is_that_of_the_gap_above_the_noise() -> None:
     assert overall({}) == 0.0
 
 
-def test_a_diverging_simulation_is_a_gap_not_a_crash(cases: Cases) -> None:
+def test_a_diverging_simulation_is_reported_as_a_gap(cases: Cases) -> None:
     found = examine(cases.record(FOUND["column"]))
     judge = gaps.RecordingGaps(found, found.record, gaps.held_out(found.record))
     assert judge.loop is not None

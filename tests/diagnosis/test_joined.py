@@ -1,4 +1,4 @@
-"""Several recordings of the same laboratories as one: what is found must explain all of them."""
+"""Several recordings of the same laboratories are diagnosed together; a cause must explain all of them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def records(cases: Cases) -> tuple[Record, Record]:
 
 
 @pytest.mark.parametrize("part_of", [lab_a, lab_b])
-def test_predicts_each_recording_from_its_own_inputs(
+def test_each_joined_recording_is_predicted_from_its_own_inputs(
     part_of: Callable[[Record], object], records: tuple[Record, Record]
 ) -> None:
     pieces = [part_of(record) for record in records]
@@ -46,7 +46,9 @@ def test_predicts_each_recording_from_its_own_inputs(
     assert part.measured.shape == part.present.shape == (2000 + 1500, part.predict(system).shape[1])
 
 
-def test_first_ticks_reach_over_the_end_of_a_recording(records: tuple[Record, Record]) -> None:
+def test_the_first_ticks_of_joined_recordings_may_extend_into_the_second_recording(
+    records: tuple[Record, Record],
+) -> None:
     part, system = JoinedPart([lab_b(record) for record in records]), System(records[0].plan)
     for ticks in (300, 2000, 2600):
         begun = part.first(ticks)
@@ -71,7 +73,7 @@ def test_recordings_of_other_laboratories_are_refused(records: tuple[Record, Rec
         refuse_others(first, [replace(second, plan=stiffer)])
 
 
-def test_a_second_recording_narrows_the_interval(cases: Cases) -> None:
+def test_a_second_recording_narrows_the_confidence_interval(cases: Cases) -> None:
     first, second = (cases.record(FRICTION, duration=4.0, scale=scale) for scale in (0.1, 0.2))
     widths = []
     for others in ([], [lab_b(second)]):
@@ -82,7 +84,7 @@ def test_a_second_recording_narrows_the_interval(cases: Cases) -> None:
     assert widths[1] < 0.9 * widths[0]
 
 
-def test_a_cause_in_one_recording_only_explains_not_both(cases: Cases) -> None:
+def test_a_cause_in_only_one_of_two_recordings_is_not_accepted(cases: Cases) -> None:
     clean, stuck = cases.record(duration=4.0), cases.record(FRICTION, duration=4.0)
     part = joined(lab_b(stuck), [lab_b(clean)], 4)
     part.candidates = tuple(effect for effect in part.candidates if effect.name in FRICTION)

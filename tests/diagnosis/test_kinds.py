@@ -52,7 +52,7 @@ def named(report: Report) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize(("lab", "said"), [("master", "master"), ("slave.east", "slave 'east'")])
-def test_of_two_columns_the_one_that_yields_is_named(lab: str, said: str, tmp_path: Path) -> None:
+def test_the_yielding_one_of_two_columns_is_named(lab: str, said: str, tmp_path: Path) -> None:
     report = diagnosed(TWO, tmp_path, {**YIELDING, "laboratory": lab})["east"]
     assert report.status == "explained"
     assert named(report) == (f"{lab}.column.yielding",)
@@ -81,7 +81,7 @@ def test_a_master_without_a_rig_gives_a_report_per_slave(tmp_path: Path) -> None
     assert boxes(reports["dampers"]) == ["ground", "structure", "link", "table", "damper"]
 
 
-def test_a_fault_of_a_users_device_is_named(tmp_path: Path) -> None:
+def test_a_hidden_effect_of_a_users_device_is_named(tmp_path: Path) -> None:
     report = diagnosed(OWN, tmp_path, {"name": "device.leak", "share": 0.2})[""]
     assert named(report) == ("device.leak",)
     found = report.which[0].parameters["device.leak"]["share"]

@@ -1,4 +1,4 @@
-"""A column that yields by another law than the first is named alike, and the fit says which law it is."""
+"""A column that yields by any law of the catalogue is named as yielding, and the fit names the law."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ K, LIMIT, HARDENING = Plan().column.stiffness, 1.2e-3, 0.05
 
 
 def swelling() -> Array:
-    """A motion that goes farther with every cycle, and then less far."""
+    """A motion whose cycles grow and then shrink."""
     t = np.arange(TICKS) * INTERVAL
     return np.asarray(2.6e-3 * np.sin(2.0 * np.pi * 1.3 * t) * np.sin(np.pi * t / t[-1]))
 
 
 def slider(x: Array) -> Array:
-    """A spring beside another one that a slider limits, step by step."""
+    """A spring in parallel with a spring and slider in series, computed step by step."""
     held, result = 0.0, np.empty(x.size)
     for i, step in enumerate(np.diff(x, prepend=0.0)):
         held = min(max(held + step, -LIMIT), LIMIT)
@@ -41,7 +41,7 @@ def slider(x: Array) -> Array:
 
 
 class MadeSpecimen:
-    """A column alone, with forces of a law that the catalogue's first one is not."""
+    """A column alone, whose forces follow another law than the catalogue's first one."""
 
     name, role, exact = "column", MASTER, False
     signals: tuple[str, ...] = ("column_force",)
@@ -102,7 +102,7 @@ def test_a_pinched_law_with_damage_is_found_from_force_over_deformation() -> Non
     assert found.chi < 1.2 * found.reduced.size
 
 
-def test_of_several_recordings_the_one_that_goes_farthest_starts_a_law() -> None:
+def test_the_recording_with_the_largest_deformation_starts_the_fit_of_a_law() -> None:
     near, far = Driven(), Driven()
     near.inputs = 0.5 * near.inputs
     found = laws.path(JoinedPart([near, far]))
@@ -111,7 +111,7 @@ def test_of_several_recordings_the_one_that_goes_farthest_starts_a_law() -> None
     assert laws.path(MadeSpecimen()) is None
 
 
-def test_the_law_is_picked_and_its_parameters_are_those_of_the_column() -> None:
+def test_the_right_law_is_selected_with_the_columns_parameters() -> None:
     before = first_law()
     (found,) = laws.in_best_laws([before])
     values = found.values["column.yielding"]

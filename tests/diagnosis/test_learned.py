@@ -1,4 +1,4 @@
-"""Laws that are learned of what no effect explains: what they can be, and how their errors are judged."""
+"""Laws that are learned from residuals which no effect explains: their forms and the estimate of their errors."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def learned(law: str, seed: int = 1, noise: float = 100.0) -> tuple[Regression |
 
 
 def left(found: Regression, law: str, seed: int, size: float) -> float:
-    """Share of the law's rms that is missed on a motion."""
+    """The rms error of a learned law on a motion, relative to the law's rms."""
     x = motion(seed, size)
     true = LAWS[law](x)
     missed = true - preisach.play(found.law, x, rate(x))
@@ -81,7 +81,7 @@ def left(found: Regression, law: str, seed: int, size: float) -> float:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_foreign_law_is_learned_for_another_motion_and_a_larger_one(law: str) -> None:
+def test_a_law_outside_the_catalogue_is_learned_and_holds_for_another_and_a_larger_motion(law: str) -> None:
     found, _ = learned(law)
     assert found is not None
     assert found.share > 0.95
@@ -89,7 +89,7 @@ def test_a_foreign_law_is_learned_for_another_motion_and_a_larger_one(law: str) 
     assert left(found, law, seed=3, size=2.6e-3) < 0.25
 
 
-def test_nothing_is_learned_of_noise_of_any_colour() -> None:
+def test_no_law_is_learned_from_noise_of_any_colour() -> None:
     x = motion(1, 2e-3)
     there = np.ones(TICKS, dtype=bool)
     white = np.random.default_rng(4).standard_normal(TICKS)
@@ -98,14 +98,14 @@ def test_nothing_is_learned_of_noise_of_any_colour() -> None:
         assert regress(x, rate(x), series, there, INTERVAL) is None
 
 
-def test_nothing_is_learned_where_nothing_moves_or_most_is_missing() -> None:
+def test_no_law_is_learned_without_motion_or_with_most_samples_missing() -> None:
     x = motion(1, 2e-3)
     y = bilinear(x)
     assert regress(0.0 * x, 0.0 * x, y, np.ones(TICKS, dtype=bool), INTERVAL) is None
     assert regress(x, rate(x), y, np.zeros(TICKS, dtype=bool), INTERVAL) is None
 
 
-def test_the_band_holds_on_another_motion_and_grows_beyond_what_was_seen() -> None:
+def test_the_band_of_a_learned_law_covers_another_motion_and_widens_beyond_the_learned_range() -> None:
     found, x = learned("flag")
     assert found is not None
     other = motion(5, 2e-3)
@@ -115,7 +115,7 @@ def test_the_band_holds_on_another_motion_and_grows_beyond_what_was_seen() -> No
     assert np.max(found.band(far, rate(far))) > 1.5 * np.max(found.band(x, rate(x)))
 
 
-def test_the_strongest_part_is_predicted_by_a_law_of_the_rest() -> None:
+def test_the_strongest_part_of_a_test_is_predicted_by_a_law_learned_from_the_rest() -> None:
     found, x = learned("bilinear", noise=0.0)
     assert found is not None
     first, last = found.strongest
@@ -125,7 +125,7 @@ def test_the_strongest_part_is_predicted_by_a_law_of_the_rest() -> None:
     assert np.std(missed[first:last]) < 0.1 * np.std(bilinear(x)[first:last])
 
 
-def test_marching_gives_what_the_regression_saw() -> None:
+def test_stepping_a_law_in_time_gives_the_values_of_the_regression() -> None:
     x = motion(1, 2e-3)
     for grid in (STEADY, AGEING):
         bare = preisach.pack(grid, 2e-3, 0.03)
@@ -137,7 +137,7 @@ def test_marching_gives_what_the_regression_saw() -> None:
         assert preisach.features(bare, x, rate(x)).shape == (TICKS, weights.size)
 
 
-def test_the_dampers_force_is_that_of_its_laboratory() -> None:
+def test_the_dampers_force_agrees_with_the_simulated_laboratory() -> None:
     system = lay(System(Plan()), [("damper.friction", {"force": 3.0}), ("damper.offset", {"force": 1.0})])
     t = np.arange(3000) * INTERVAL
     command = np.stack([0.01 * np.sin(9.0 * t), 20.0 * np.sin(13.0 * t)], axis=1)
@@ -161,7 +161,7 @@ def test_the_tables_acceleration_follows_from_its_motion() -> None:
     assert np.std((without - felt)[100:]) > 0.2 * np.std(felt)
 
 
-def test_what_brakes_a_table_is_learned_and_marched() -> None:
+def test_a_force_that_acts_against_a_table_is_learned_and_stepped_in_time() -> None:
     """A spring that stiffens beside the servo loop, which no effect of the table is."""
     base, drive = System(Plan()), np.stack([motion(1, 20e-3), np.zeros(TICKS)], axis=1)
     x = motion(7, 20e-3)
@@ -187,7 +187,7 @@ def test_what_brakes_a_table_is_learned_and_marched() -> None:
     ("kind", "machine", "law", "channel"),
     [("column", "column", clearance, 1), ("column", "actuator", flag, 0), ("table", "damper", damping, 3)],
 )
-def test_a_laboratory_marches_with_a_law(
+def test_a_laboratory_is_simulated_with_a_learned_law(
     kind: str, machine: str, law: Callable[[Array], Array], channel: int
 ) -> None:
     drive = np.stack([motion(1, 2e-3), np.zeros(TICKS)], axis=1)

@@ -29,7 +29,7 @@ NETWORK = "models.link.impaired:ImpairedLink"
 
 
 def recorded(link: LinkModel, ticks: int = TICKS, *, stamps: bool = True) -> Run:
-    """The messages' part of a recording in virtual time, without the laboratories."""
+    """The link's part of a recording in virtual time, without the laboratories."""
     found, seq = exchange(ticks, DT, link), np.arange(ticks)
     run = Run(Path("x"))
     run.columns = {"master": {"damper_force_seq": found.feedback}, "slave": {"command_seq": found.command}}
@@ -83,7 +83,7 @@ def played(plan: Plan, path: Path, **options: float) -> Run:
 # -- what is found --------------------------------------------------------------------------------
 
 
-def test_parameters_are_found_again_over_a_grid() -> None:
+def test_the_parameters_of_an_impaired_link_are_found_over_a_grid() -> None:
     errors: dict[str, list[float]] = {}
     inside: dict[str, list[bool]] = {}
     grid = product((0.0, 0.001, 0.0037, 0.02), (0.0, 0.0002, 0.001, 0.005), ((0, 1), (0.05, 1), (0.05, 8)))
@@ -101,7 +101,7 @@ def test_parameters_are_found_again_over_a_grid() -> None:
 
 
 @pytest.mark.parametrize("burst", [1.0, 8.0])
-def test_rare_losses_are_found_with_honest_intervals(burst: float) -> None:
+def test_rare_losses_are_found_with_intervals_that_cover_them(burst: float) -> None:
     hits = []
     for seed in range(20):
         found = values(recorded(ImpairedLink(seed, 0.003, 0.0005, 0.004, burst)))
@@ -119,7 +119,7 @@ def test_nothing_is_found_on_a_clean_link() -> None:
         assert [item.old_share for item in told.directions] == [0.0, 0.0]
 
 
-def test_without_stamps_a_delay_is_known_up_to_ticks() -> None:
+def test_without_time_stamps_a_delay_is_found_to_within_a_tick() -> None:
     found = values(recorded(ImpairedLink(2, delay=0.0051), stamps=False))
     assert found.keys() == {"delay"}
     assert found["delay"][0] == pytest.approx(0.005)
@@ -130,7 +130,7 @@ def test_without_stamps_a_delay_is_known_up_to_ticks() -> None:
     ("delay", "jitter", "loss", "burst"),
     [(0.0037, 0.001, 0.05, 8.0), (0.01, 0.005, 0.0, 1.0), (0.0, 0.002, 0.0, 1.0)],
 )
-def test_without_stamps_the_ages_tell_what_scatters(
+def test_without_time_stamps_jitter_and_loss_are_found_from_the_ages_of_messages(
     delay: float, jitter: float, loss: float, burst: float
 ) -> None:
     found = values(recorded(ImpairedLink(4, delay, jitter, loss, burst), stamps=False))
@@ -141,7 +141,7 @@ def test_without_stamps_the_ages_tell_what_scatters(
 
 
 class Symmetric:
-    """Delays scattered evenly about their mean."""
+    """A link with delays that scatter symmetrically about their mean."""
 
     def __init__(self) -> None:
         random = np.random.default_rng(1)
@@ -151,13 +151,13 @@ class Symmetric:
         return float(self.delays[direction][seq])
 
 
-def test_the_constant_part_of_an_even_scatter_is_its_mean() -> None:
+def test_the_constant_delay_of_a_symmetric_scatter_is_its_mean() -> None:
     found = values(recorded(Symmetric()))
     assert found["delay"][0] == pytest.approx(0.008, rel=0.02)
     assert found["std"][0] == pytest.approx(0.0005, rel=0.05)
 
 
-def test_holes_in_a_recording_are_no_losses() -> None:
+def test_gaps_in_a_recording_do_not_count_as_lost_messages() -> None:
     run = recorded(ImpairedLink(1, delay=0.003))
     kept = np.random.default_rng(1).random(TICKS) > 0.02
     for topic in ("master", "slave", "latency"):
@@ -166,7 +166,7 @@ def test_holes_in_a_recording_are_no_losses() -> None:
     assert values(run).keys() == {"delay"}
 
 
-def test_late_ticks_are_counted_apart_and_are_no_effect() -> None:
+def test_late_ticks_are_counted_separately_and_are_not_an_effect() -> None:
     run = recorded(ImpairedLink(1), 3000)
     latency, used = run.columns["latency"], run.columns["master"]["damper_force_seq"]
     latency["wake_lateness"] = np.full(3000, 3e-5)
@@ -202,7 +202,7 @@ def test_a_clean_recording_shows_nothing(virtual_recording: Path) -> None:
         {"loss": 0.02},
     ],
 )
-def test_a_recording_tells_exchange_and_stamps_of_its_network(
+def test_the_exchange_and_time_stamps_in_a_recording_are_those_of_its_network(
     options: dict[str, float], short_plan: Plan, tmp_path: Path
 ) -> None:
     run = played(short_plan, tmp_path / "impaired.mcap", **options)

@@ -1,4 +1,4 @@
-"""Recordings through a logger: forces with noise of their own, and coloured noise beside effects that look like it."""
+"""Recordings through a logger with extra noise on the forces, and coloured noise beside effects that resemble it."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ def relogged(whole: Record, name: str, values: Array) -> Record:
 
 
 def logged(whole: Record) -> residuals.Data:
-    """Its building by the balance of its forces."""
+    """The building of a record as a part that is judged by its balance of forces."""
     part = Building(whole).logged()
     assert part is not None
     return residuals.prepare(part, whole)
 
 
 def noisy(whole: Record, colour: float = 0.0) -> Record:
-    """The record with noise of a logger on the force, each sample so much of the one before, which comes late."""
+    """The record with a delayed force and autoregressive noise of the logger on it."""
     force = whole.signals["column_force"]
     noise = signal.lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], white(21, force.size))
     late = np.concatenate([np.full(LATE, force[0]), force[:-LATE]])
     return relogged(whole, "column_force", late + LEVEL * noise)
 
 
-def test_forces_with_noise_of_their_own_came_through_a_logger(cases: Cases) -> None:
+def test_forces_with_extra_noise_are_recognized_as_logged(cases: Cases) -> None:
     whole = cases.record()
     assert not own_noise(logged(whole))
     assert not own_noise(logged(cases.record({"structure.mass": {"factor": 1.1}})))
@@ -52,7 +52,7 @@ def test_forces_with_noise_of_their_own_came_through_a_logger(cases: Cases) -> N
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.9])
-def test_a_logger_tells_its_delay_and_its_noise_is_no_gap(cases: Cases, colour: float) -> None:
+def test_a_loggers_delay_is_found_and_its_noise_is_not_a_gap(cases: Cases, colour: float) -> None:
     found = search(logged(noisy(cases.record(), colour)), Scales(cases.record()))
     assert found.chosen.names == ()
     assert isinstance(found.data.part, LoggedBuilding)
@@ -60,7 +60,7 @@ def test_a_logger_tells_its_delay_and_its_noise_is_no_gap(cases: Cases, colour: 
     assert found.chosen.prior < 9.0  # neither gain nor delay makes the noise smaller, so none is pulled away
 
 
-def test_a_delay_keeps_the_level_of_noise() -> None:
+def test_delaying_a_reading_keeps_its_noise_level() -> None:
     noise = white(22, 4000)
     assert np.std(earlier(noise, 0.5)) == pytest.approx(np.std(noise), rel=0.01)
     wave = np.sin(2.0 * np.pi * np.arange(4000) / 250.0)
@@ -68,7 +68,7 @@ def test_a_delay_keeps_the_level_of_noise() -> None:
 
 
 def in_column(whole: Record, values: Array) -> Search:
-    """What is found in the master's laboratory with something more in the displacement."""
+    """The search in the master's laboratory with a signal added to the displacement."""
     name = "column_displacement"
     changed = relogged(whole, name, whole.signals[name] + values)
     return search(residuals.prepare(lab_a(changed), changed), Scales(changed))
@@ -81,19 +81,19 @@ def drifting(cases: Cases) -> Search:
     return in_column(whole, 3e-6 * whole.time)
 
 
-def test_a_drift_is_no_slow_noise(drifting: Search) -> None:
+def test_a_drift_is_not_taken_for_slow_noise(drifting: Search) -> None:
     found = drifting
     assert found.chosen.names == ("sensor.column_displacement.drift",)
     assert found.chosen.values["sensor.column_displacement.drift"]["rate"] == pytest.approx(3e-6, rel=0.15)
 
 
-def test_slow_noise_is_no_drift(cases: Cases) -> None:
+def test_slow_noise_is_not_taken_for_a_drift(cases: Cases) -> None:
     whole = cases.record()
     noise = signal.lfilter([1.0], [1.0, -0.95], white(23, whole.ticks))
     assert in_column(whole, 5e-6 * noise).chosen.names == ()
 
 
-def test_a_motion_that_several_sensors_see_is_no_pickup(cases: Cases) -> None:
+def test_a_motion_in_several_readings_is_not_taken_for_pickup(cases: Cases) -> None:
     whole = cases.record()
     motion = 2e-5 * np.sin(2.0 * np.pi * 11.3 * whole.time)
     alone = in_column(whole, motion)
@@ -105,7 +105,7 @@ def test_a_motion_that_several_sensors_see_is_no_pickup(cases: Cases) -> None:
     assert verdict.judge(both).outcome == "unknown"
 
 
-def test_nominal_parameters_that_are_all_far_off_speak_against_an_effect(drifting: Search) -> None:
+def test_large_errors_of_all_nominal_parameters_make_an_effect_less_certain(drifting: Search) -> None:
     far = replace(drifting.chosen, z=np.full(drifting.chosen.z.size, 2.9))
     assert verdict.certainty(drifting) > 0.9
     assert verdict.certainty(replace(drifting, chosen=far)) < 0.5
@@ -113,7 +113,7 @@ def test_nominal_parameters_that_are_all_far_off_speak_against_an_effect(driftin
     assert verdict.judge(replace(drifting, chosen=worse)).outcome == "unknown"
 
 
-def test_what_hardly_closes_the_gap_explains_nothing(cases: Cases, drifting: Search) -> None:
+def test_an_effect_that_hardly_closes_the_gap_is_not_an_explanation(cases: Cases, drifting: Search) -> None:
     whole = cases.record()
     found = Diagnosis(whole, verdicts=[verdict.judge(drifting)])
     far = HowFar(

@@ -37,7 +37,7 @@ def scaled(data: Data, factor: float) -> Data:
     return dataclasses.replace(data, part=part.replaced(inputs=inputs))
 
 
-def test_larger_motion_separates_what_depends_on_amplitude(cases: Cases) -> None:
+def test_a_larger_motion_separates_candidates_that_depend_on_amplitude(cases: Cases) -> None:
     data = laboratory(cases)
     yielding = hypothesis(data, "column.yielding", yield_displacement=2e-3)
     softer = hypothesis(data, "column.stiffness", factor=0.95)
@@ -60,7 +60,7 @@ def test_a_hypothesis_is_not_separated_from_itself(cases: Cases) -> None:
     assert next_test.separation(data, one, one) < 1e-6
 
 
-def test_the_menu_stays_within_what_was_reached_or_says_so(cases: Cases) -> None:
+def test_proposed_tests_stay_within_the_reached_range_or_state_that_they_exceed_it(cases: Cases) -> None:
     data = laboratory(cases)
     part = data.part
     assert isinstance(part, LaboratoryPart)
@@ -74,21 +74,21 @@ def test_the_menu_stays_within_what_was_reached_or_says_so(cases: Cases) -> None
     assert part.inputs["actuator_command"] is not None  # the recording's own are as they were
 
 
-def test_what_is_explained_and_unambiguous_needs_no_test(cases: Cases) -> None:
+def test_an_unambiguous_explanation_needs_no_further_test(cases: Cases) -> None:
     report = cases.report({"column.friction": {"force": 900.0}})
     assert report["equivalent"] == []
     assert report["next_test"] == ""
     assert report["details"]["next"] == []
 
 
-def test_what_no_motion_separates_asks_for_a_look_at_the_sensor(cases: Cases) -> None:
+def test_candidates_that_no_motion_separates_lead_to_the_advice_to_check_the_sensor(cases: Cases) -> None:
     report = cases.report({"column.stiffness": {"factor": 1.1}})
     assert "check the sensor" in report["next_test"]
     assert "No proposed motion separates" in report["next_test"]
     assert report["details"]["next"][0]["separation"] < next_test.ENOUGH
 
 
-def test_the_advice_in_words() -> None:
+def test_the_advice_on_the_next_test_is_stated_in_words() -> None:
     assert next_test.sentence([]) == ""
     best = ChosenTest("a sine", 12.4, ("column.slip", "column.pinching"))
     other = ChosenTest("slow cycles", 2.0, ("column.slip", "column.friction"))

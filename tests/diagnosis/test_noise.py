@@ -16,7 +16,7 @@ def test_a_constant_reading_has_no_quantum(n: int) -> None:
     assert quantum(np.full(n, 3.3)) == 0.0
 
 
-def test_not_finite_is_refused() -> None:
+def test_readings_that_are_not_finite_are_refused() -> None:
     with pytest.raises(InputError):
         quantum(np.array([]))
 
@@ -27,13 +27,13 @@ def test_not_finite_is_refused() -> None:
     spread=st.floats(1.0, 3000.0),
     seed=st.integers(0, 99),
 )
-def test_quantum_of_rounded_noise(step: float, offset: float, spread: float, seed: int) -> None:
+def test_the_quantum_of_rounded_noise_is_found(step: float, offset: float, spread: float, seed: int) -> None:
     places = np.round(np.random.default_rng(seed).normal(0.0, spread, 2000))
     gap = float(np.gcd.reduce(np.diff(np.unique(places)).astype(np.int64)))
     assert quantum(places * step + offset * step) == pytest.approx(gap * step, rel=1e-9)
 
 
-def test_quantum_with_missing_levels() -> None:
+def test_the_quantum_is_found_although_levels_are_missing() -> None:
     assert quantum(0.1 * np.array([0.0, 2.0, 2.0, 5.0, 9.0])) == pytest.approx(0.1)
     assert quantum(0.3 * np.array([6.0, 10.0, 21.0, 1000.0])) == pytest.approx(0.3)
     assert quantum(np.array([1.0, 1.0, 4.0])) == pytest.approx(3.0)

@@ -25,7 +25,7 @@ def found_in(whole: Record) -> list[SensorFinding]:
     ("signal", "step"),
     [("damper_force", 2.0), ("column_displacement", 5e-5), ("column_force", 1000.0), ("damper_stroke", 1e-4)],
 )
-def test_rounding_is_found_with_its_step(cases: Cases, signal: str, step: float) -> None:
+def test_a_rounded_reading_is_found_with_its_step(cases: Cases, signal: str, step: float) -> None:
     (found,) = found_in(cases.record({f"sensor.{signal}.quantization": {"step": step}}, duration=8.0))
     assert found.effect == f"sensor.{signal}.quantization"
     assert found.value == pytest.approx(step, rel=1e-9)
@@ -41,14 +41,14 @@ def test_rounding_far_below_the_noise_is_no_finding(cases: Cases) -> None:
 @pytest.mark.parametrize(
     ("signal", "rms"), [("column_force", 500.0), ("damper_stroke", 2e-5), ("table_acceleration", 0.05)]
 )
-def test_noise_is_found_with_its_size(cases: Cases, signal: str, rms: float) -> None:
+def test_a_noisy_reading_is_found_with_its_noise_level(cases: Cases, signal: str, rms: float) -> None:
     (found,) = found_in(cases.record({f"sensor.{signal}.noise": {"rms": rms}}, duration=8.0))
     assert found.effect == f"sensor.{signal}.noise"
     assert found.value == pytest.approx(rms, rel=0.05)
     assert found.interval[0] < found.value < found.interval[1]
 
 
-def test_sensors_as_planned_are_left_in_peace(cases: Cases) -> None:
+def test_sensors_as_planned_give_no_finding(cases: Cases) -> None:
     for seed in (0, 1, 2):
         whole = cases.record(seed=seed, duration=8.0)
         assert readings.steps(whole) == {}
@@ -56,14 +56,14 @@ def test_sensors_as_planned_are_left_in_peace(cases: Cases) -> None:
         assert readings.held(whole, {}) == {}
 
 
-def test_sensors_that_are_all_noisier_than_planned_are_not_blamed(cases: Cases) -> None:
+def test_sensors_that_are_all_equally_noisier_than_planned_give_no_finding(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
     datas = [residuals.prepare(kind(whole), whole) for kind in (lab_a, lab_b)]
     loud = {name: 1.9 * level for name, level in readings.levels(datas).items()}
     assert readings.findings(whole, loud, {}) == []
 
 
-def test_decimals_that_readings_of_a_unit_share_are_the_logger_s(cases: Cases) -> None:
+def test_rounding_shared_by_all_readings_of_a_unit_is_attributed_to_the_logger(cases: Cases) -> None:
     effects = {f"sensor.{name}.quantization": {"step": 1.0} for name in ("column_force", "damper_force")}
     more = {
         f"sensor.{name}.quantization": {"step": 1e-6}
@@ -72,7 +72,7 @@ def test_decimals_that_readings_of_a_unit_share_are_the_logger_s(cases: Cases) -
     assert found_in(cases.record({**effects, **more}, duration=8.0)) == []
 
 
-def test_noise_of_a_converter_is_the_logger_s(cases: Cases) -> None:
+def test_noise_of_a_converter_is_attributed_to_the_logger(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
     levels = readings.levels([residuals.prepare(kind(whole), whole) for kind in (lab_a, lab_b)])
     loud = levels | {"damper_stroke": 6e-4 * float(np.max(np.abs(whole.signals["damper_stroke"])))}
@@ -91,7 +91,7 @@ def test_repeated_samples_are_counted(cases: Cases) -> None:
     assert found["damper_force"] == pytest.approx(missed.size / 4000, rel=0.01)
 
 
-def test_a_sensor_that_stands_still_has_missed_nothing(cases: Cases) -> None:
+def test_a_sensor_at_rest_does_not_count_as_missing_samples(cases: Cases) -> None:
     run = read(cases.file(duration=8.0))
     run.columns["slave"]["damper_force"] = np.zeros(4000)
     assert readings.held(record.build(run), {}) == {}

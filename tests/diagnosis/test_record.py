@@ -1,4 +1,4 @@
-"""Recordings laid out on their ticks: holes, missing channels, plans, the ideal test."""
+"""Records of a test on its ticks: gaps, missing channels, plans, the ideal test."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.diagnosis.cases import Cases, short
 
 
 def run_of(cases: Cases) -> Run:
-    """A recording of ten seconds, to be spoilt."""
+    """A recording of ten seconds that a test may change."""
     return read(cases.file())
 
 
@@ -39,7 +39,7 @@ def kept(run: Run, topic: str, rows: NDArray[np.int64]) -> Run:
     st.lists(st.one_of(st.none(), st.just(np.nan), st.floats(-1e6, 1e6)), max_size=40),
     st.integers(0, 5),
 )
-def test_values_are_held_over_holes_and_holes_are_marked(rest: list[float | None], more: int) -> None:
+def test_values_are_held_over_gaps_and_gaps_are_marked(rest: list[float | None], more: int) -> None:
     given_ = [*rest, 1.0]  # a channel holds a message at least
     places = np.array([i for i, value in enumerate(given_) if value is not None], dtype=np.int64)
     values = np.array([value for value in given_ if value is not None], dtype=np.float64)
@@ -60,7 +60,7 @@ def test_one_storey_that_is_not_finite_makes_a_tick_missing() -> None:
     assert held.tolist() == [[1, 2], [1, 2], [1, 2], [5, 6], [5, 6]]
 
 
-def test_a_whole_recording_has_everything(cases: Cases) -> None:
+def test_a_complete_recording_has_every_signal(cases: Cases) -> None:
     found = record.build(run_of(cases))
     assert found.ticks == 5000
     assert found.has("displacement", "column_force", "table_command", "damper_force", "damper_force_used")
@@ -87,14 +87,14 @@ def test_missing_messages_are_marked_and_held(cases: Cases) -> None:
     assert found.has("column_force")
 
 
-def test_a_signal_that_is_mostly_missing_is_not_there(cases: Cases) -> None:
+def test_a_signal_that_is_mostly_missing_counts_as_not_recorded(cases: Cases) -> None:
     run = run_of(cases)
     run.columns["slave"]["damper_stroke"][::2] = np.nan
     run.columns["slave"]["damper_stroke"][:10] = np.nan
     assert not record.build(run).has("damper_stroke")
 
 
-def test_what_is_not_recorded_is_said_and_the_rest_is_judged(cases: Cases) -> None:
+def test_signals_that_were_not_recorded_are_reported_and_the_others_judged(cases: Cases) -> None:
     run = without(run_of(cases), "slave", "table_displacement", "table_acceleration")
     run = without(run, "master", "actuator_command")
     found = record.build(run)
@@ -105,7 +105,7 @@ def test_what_is_not_recorded_is_said_and_the_rest_is_judged(cases: Cases) -> No
     assert any("actuator_command" in text for text in warnings)
 
 
-def test_one_laboratory_alone(cases: Cases) -> None:
+def test_a_recording_of_one_laboratory_is_judged_alone(cases: Cases) -> None:
     run = run_of(cases)
     del run.columns["master"], run.sequences["master"]
     found = record.build(run)
@@ -131,13 +131,13 @@ def test_a_recording_without_signals_is_refused(cases: Cases) -> None:
         record.build(run)
 
 
-def test_another_plan_believes_in_another_motion(cases: Cases) -> None:
+def test_another_plan_gives_another_nominal_ground_motion(cases: Cases) -> None:
     found = record.build(run_of(cases), short(scale=0.2))
     assert found.ground is not None
     assert np.allclose(found.ground[0, :-1], 2.0 * found.signals["ground_acceleration"])
 
 
-def test_a_longer_recording_than_its_ground_goes_on_with_the_last_value(cases: Cases) -> None:
+def test_a_recording_longer_than_its_ground_motion_holds_the_last_value(cases: Cases) -> None:
     run = run_of(cases)
     rows = np.frombuffer(run.attachments[GROUND], dtype="<f8").reshape(2, -1)[:, :3000]
     run.attachments[GROUND] = rows.tobytes()
@@ -147,7 +147,7 @@ def test_a_longer_recording_than_its_ground_goes_on_with_the_last_value(cases: C
     assert set(found[0, 3000:]) == {found[0, 2999]}
 
 
-def test_the_ideal_test_drives_transfer_systems_by_their_targets(cases: Cases) -> None:
+def test_in_the_ideal_test_the_transfer_systems_are_commanded_with_their_targets(cases: Cases) -> None:
     plain, held = record.build(run_of(cases)), record.build(run_of(cases), against_ideal=True)
     target = plain.signals["column_target"]
     assert np.array_equal(held.signals["actuator_command"][:-1], target[1:])

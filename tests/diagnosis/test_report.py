@@ -1,4 +1,4 @@
-"""The report as a whole: its schema, its sums, its honesty, and that it is the same every time."""
+"""The report as a whole: its schema, its sums, its independence of file names, and its repeatability."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SECONDS = {"link": 8.0, "reading": 8.0}
 
 
 def report_of(cases: Cases, kind: str) -> dict[str, Any]:
-    """The report of a kind of case."""
+    """The report on a case of this kind."""
     return cases.report(KINDS[kind], duration=SECONDS.get(kind, 10.0))
 
 
@@ -49,7 +49,7 @@ def numbers(value: Any) -> Iterator[float]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_report_is_whole(cases: Cases, kind: str) -> None:
+def test_a_report_fits_its_schema_adds_up_and_gives_a_page(cases: Cases, kind: str) -> None:
     report = report_of(cases, kind)
     assert report["version"] == 2
     assert all(noise["unit"] for part in report["parts"] for noise in part["noise_model"].values())
@@ -60,7 +60,7 @@ def test_a_report_is_whole(cases: Cases, kind: str) -> None:
 
 
 def keeps_to_its_schema(report: dict[str, Any]) -> None:
-    """Plain values without NaN, as published."""
+    """Asserts that a report holds plain values without NaN and fits the published schema."""
     jsonschema = pytest.importorskip("jsonschema")
     text = json.dumps(report, allow_nan=False)
     assert json.loads(text) == report
@@ -69,7 +69,7 @@ def keeps_to_its_schema(report: dict[str, Any]) -> None:
 
 
 def adds_up(report: dict[str, Any]) -> None:
-    """Shares sum to one; probabilities are sorted and no more than one."""
+    """Asserts that shares sum to one and that probabilities are sorted and at most one."""
     shares = [entry["share"] for entry in report["where"]]
     assert shares == sorted(shares, reverse=True)
     assert sum(shares) == pytest.approx(1.0 if shares else 0.0)
@@ -85,7 +85,7 @@ def adds_up(report: dict[str, Any]) -> None:
 
 
 def shows_on_a_page(report: dict[str, Any]) -> None:
-    """One page that loads nothing, the same every time."""
+    """Asserts that a report gives one page that loads nothing and is the same every time."""
     text = page.page(read.report(report))
     assert page.page(read.report(json.loads(json.dumps(report)))) == text
     assert text.startswith("<!doctype html>")
@@ -94,7 +94,9 @@ def shows_on_a_page(report: dict[str, Any]) -> None:
     assert not any(word in text for word in ('src="http', 'href="http', "@import", "<script src"))
 
 
-def test_a_report_says_nothing_of_the_case_but_the_files_name(cases: Cases, tmp_path: Path) -> None:
+def test_a_report_depends_on_the_recording_and_not_on_the_name_of_its_file(
+    cases: Cases, tmp_path: Path
+) -> None:
     original, report = cases.file(KINDS["one"]), report_of(cases, "one")
     renamed = tmp_path / "sensor.damper_force.gain-seed-77.mcap"
     shutil.copyfile(original, renamed)
@@ -112,13 +114,13 @@ def test_a_report_says_nothing_of_the_case_but_the_files_name(cases: Cases, tmp_
         assert "seed" not in text.lower()
 
 
-def test_what_was_diagnosed_before_does_not_matter(cases: Cases) -> None:
+def test_a_report_does_not_depend_on_earlier_diagnoses(cases: Cases) -> None:
     first = diagnose_file(cases.file(KINDS["reading"], duration=8.0)).plain()
     diagnose_file(cases.file(KINDS["link"], duration=8.0))
     assert diagnose_file(cases.file(KINDS["reading"], duration=8.0)).plain() == first
 
 
-def test_what_could_not_have_appeared_is_listed_and_not_named(cases: Cases) -> None:
+def test_effects_that_could_not_have_appeared_are_listed_and_not_blamed(cases: Cases) -> None:
     report = report_of(cases, "one")
     assert not set(report["not_exercised"]) & set(report["which"][0]["effects"])
     assert len(set(report["not_exercised"])) == len(report["not_exercised"])

@@ -22,19 +22,19 @@ CLASSES = [
 ]
 
 
-def test_the_published_schema_is_that_of_the_records() -> None:
+def test_the_published_schema_equals_that_of_the_records() -> None:
     assert schema.PUBLISHED.read_text(encoding="utf-8") == schema.text(), "run: python -m docs.generate"
 
 
 @pytest.mark.parametrize("entry", CLASSES, ids=lambda entry: entry.__name__)
-def test_every_field_says_what_it_is_and_cannot_be_changed(entry: Any) -> None:
+def test_every_field_of_a_report_has_a_description_and_is_immutable(entry: Any) -> None:
     assert entry.__dataclass_params__.frozen
     assert list(shapes(entry)) == [field.name for field in fields(entry)]
     assert all(field.metadata["text"] for field in fields(entry))
 
 
 @pytest.mark.parametrize("name", REPORTS)
-def test_a_report_goes_to_json_and_back(name: str) -> None:
+def test_a_report_is_the_same_after_json(name: str) -> None:
     given = fresh(name)
     found = read.report(given)
     text = json.dumps(found.plain(), allow_nan=False)
@@ -66,7 +66,7 @@ WRONG: dict[str, tuple[tuple[Any, ...], Any, str]] = {
 
 
 @pytest.mark.parametrize("kind", WRONG)
-def test_a_wrong_report_is_one_sentence(kind: str) -> None:
+def test_a_wrong_report_is_refused_in_one_sentence(kind: str) -> None:
     where, value, words = WRONG[kind]
     report = fresh("explained")
     place: Any = report
@@ -77,7 +77,7 @@ def test_a_wrong_report_is_one_sentence(kind: str) -> None:
         read.report(report, "a.json")
 
 
-def test_every_key_of_the_contract_must_be_there() -> None:
+def test_every_required_key_of_a_report_must_be_present() -> None:
     for key in set(fresh("explained")) - {"details", "verdict"}:
         report = fresh("explained")
         del report[key]
@@ -85,7 +85,7 @@ def test_every_key_of_the_contract_must_be_there() -> None:
             read.report(report)
 
 
-def test_a_file_is_read_or_refused_in_one_sentence(tmp_path: Path) -> None:
+def test_a_report_file_is_read_or_refused_in_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     path.write_text(json.dumps(fresh("explained")), encoding="utf-8")
     assert read.read(path) == read.report(fresh("explained"))

@@ -25,7 +25,7 @@ ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth
 
 
 @pytest.mark.parametrize(("effect", "values", "near"), ALONE, ids=[name for name, _, _ in ALONE])
-def test_an_effect_is_found_with_its_size(
+def test_an_effect_is_found_with_its_parameters(
     cases: Cases, effect: str, values: dict[str, float], near: dict[str, float]
 ) -> None:
     report = cases.report({effect: values})
@@ -46,7 +46,7 @@ def test_an_end_stop_is_found_with_its_stroke(cases: Cases) -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
-def test_a_clean_laboratory_is_left_in_peace(cases: Cases, seed: int) -> None:
+def test_a_clean_laboratory_gives_no_effect(cases: Cases, seed: int) -> None:
     report = cases.report(seed=seed)
     assert report["status"] == ("within_tolerances" if seed else "no_gap")
     assert named(report) == []
@@ -58,7 +58,9 @@ def test_a_clean_laboratory_is_left_in_peace(cases: Cases, seed: int) -> None:
 LATE = "sensor.column_force.delay"
 
 
-def test_a_late_force_is_found_with_its_delay_and_shown_by_its_path(cases: Cases) -> None:
+def test_a_delayed_force_reading_is_found_with_its_delay_in_the_verdict_and_the_force_path(
+    cases: Cases,
+) -> None:
     report = cases.report({LATE: {"delay": 0.002}})
     assert named(report) == [LATE]
     assert [entry["site"] for entry in report["where"]] == ["sensor.column_force"]
@@ -68,7 +70,7 @@ def test_a_late_force_is_found_with_its_delay_and_shown_by_its_path(cases: Cases
     assert path["interval"][0] <= 0.002 <= path["interval"][1]
 
 
-def test_a_short_delay_and_a_lag_of_that_size_stand_together(cases: Cases) -> None:
+def test_a_short_delay_and_a_lag_of_the_same_size_are_reported_as_equivalent(cases: Cases) -> None:
     report = cases.report({LATE: {"delay": 0.0006}})
     assert [LATE, "sensor.column_force.lag"] in [sorted(names) for names in report["equivalent"]]
 
@@ -89,7 +91,7 @@ def test_two_effects_in_one_laboratory_are_both_found(cases: Cases) -> None:
 
 
 @pytest.mark.parametrize("true", ["column.stiffness", "sensor.column_force.gain"])
-def test_what_these_signals_cannot_tell_apart_stands_together(cases: Cases, true: str) -> None:
+def test_effects_that_the_signals_cannot_tell_apart_are_reported_together(cases: Cases, true: str) -> None:
     report = cases.report({true: {"factor": 1.1}})
     assert counts_as(report, true)
     assert ["column.stiffness", "sensor.column_force.gain"] in [
@@ -97,7 +99,7 @@ def test_what_these_signals_cannot_tell_apart_stands_together(cases: Cases, true
     ]
 
 
-def test_the_gap_of_noise_is_none_and_that_of_a_trend_is_seen() -> None:
+def test_noise_gives_no_gap_and_a_trend_does() -> None:
     for seed in range(20):
         assert unexplained.gap(white(seed, 1250), 4).ratio < unexplained.MATERIAL
     slow = 2.0 * np.sin(np.linspace(0.0, 60.0, 1250))
@@ -109,7 +111,7 @@ def test_the_gap_of_noise_is_none_and_that_of_a_trend_is_seen() -> None:
     assert unexplained.gap(np.zeros(5), 4) == (0.0, 0.0)
 
 
-def test_a_search_says_what_it_explained(cases: Cases) -> None:
+def test_a_search_reports_its_effect_the_explained_share_and_costlier_alternatives(cases: Cases) -> None:
     whole = cases.record({"column.friction": {"force": 900.0}})
     data = residuals.prepare(lab_a(whole), whole)
     found = search(data, Scales(whole))

@@ -31,19 +31,19 @@ def test_white_noise_is_not_systematic(seed: int) -> None:
 
 
 @pytest.mark.parametrize("frequency", [0.3, 2.0, 9.0, 30.0])
-def test_a_strong_part_comes_back(frequency: float) -> None:
+def test_a_strong_systematic_part_is_recovered(frequency: float) -> None:
     wanted = 5.0 * np.exp(-0.05 * T) * np.sin(2.0 * np.pi * frequency * T)
     assert rms(systematic(wanted + white(1), 1.0, H) - wanted) < 0.25
 
 
-def test_ends_do_not_wrap() -> None:
+def test_the_ends_of_a_residual_do_not_affect_each_other() -> None:
     ramp = 20.0 * T / T[-1]
     error = systematic(ramp + white(2), 1.0, H) - ramp
     assert rms(error[:500]) < 0.5
     assert rms(error[-500:]) < 0.5
 
 
-def test_without_noise_all_is_systematic() -> None:
+def test_without_noise_the_whole_residual_is_systematic() -> None:
     x = white(3)
     np.testing.assert_allclose(systematic(x, 0.0, H), x, atol=1e-12)
     assert systematic_rms(x, 0.0).z == math.inf
@@ -59,7 +59,7 @@ def test_a_small_coherent_part_is_found(seed: int) -> None:
     assert found.rms == pytest.approx(0.2, rel=0.25)
 
 
-def test_z_is_standard_under_white_noise() -> None:
+def test_the_test_statistic_is_standard_normal_under_white_noise() -> None:
     z = np.array([systematic_rms(white(seed, 4000), 1.0).z for seed in range(300)])
     assert abs(z.mean()) < 0.2
     assert z.std() == pytest.approx(1.0, abs=0.15)
@@ -77,19 +77,19 @@ def test_windows_show_when_a_residual_is_large() -> None:
     assert np.sum(found.ratio**2) / 30.0 == pytest.approx(rms(residual) ** 2)
 
 
-def test_windows_of_odd_lengths() -> None:
+def test_windows_cover_records_of_odd_lengths() -> None:
     assert windows(white(5, 7), 1.0, H).t.size == 1
     assert windows(np.zeros(2301), 0.0, H).ratio.tolist() == [0.0] * 5
     assert np.all(np.isinf(windows(np.ones(2301), 0.0, H).ratio))
 
 
-def test_bands_of_white_noise_meet_the_noise() -> None:
+def test_frequency_bands_of_white_noise_have_the_noises_level() -> None:
     found = bands(2.0 * white(6), 2.0, H)
     assert np.mean(found.residual[1:-1] ** 2) == pytest.approx(found.noise[0] ** 2, rel=0.05)
     assert np.sum(found.residual**2) * found.frequency[1] == pytest.approx(4.0, rel=0.05)
 
 
-def test_the_band_of_a_tone_and_of_a_chirp() -> None:
+def test_the_frequency_band_of_a_tone_and_of_a_chirp_is_found() -> None:
     low, high = band(3.0 * np.sin(2.0 * np.pi * 5.0 * T) + white(7), 1.0, H)
     assert 4.9 < low < 5.0 < high < 5.1
     sweep = 3.0 * np.sin(2.0 * np.pi * (2.0 * T + 4.0 * T**2 / (2.0 * 30.0)))
@@ -98,7 +98,7 @@ def test_the_band_of_a_tone_and_of_a_chirp() -> None:
     assert 5.0 < high < 6.2
 
 
-def test_a_residual_that_grows_with_the_amplitude_is_shown_over_it() -> None:
+def test_a_residual_that_grows_with_the_amplitude_is_shown_over_the_amplitude() -> None:
     amplitude = 1.0 + T / 30.0
     drive = amplitude * np.sin(2.0 * np.pi * 3.0 * T)
     at, ratio = by_amplitude(amplitude**2 * white(9), drive, 1.0, 5)

@@ -25,7 +25,7 @@ WORTH = st.floats(-1e3, 1e3)
 
 
 def subsets(count: int) -> list[frozenset[str]]:
-    """All sets of the first players."""
+    """All subsets of the first players."""
     return [
         frozenset(names)
         for size in range(count + 1)
@@ -35,7 +35,7 @@ def subsets(count: int) -> list[frozenset[str]]:
 
 @st.composite
 def games(draw: st.DrawFn) -> tuple[tuple[str, ...], Mapping[frozenset[str], float]]:
-    """Players, and what every set of them is worth."""
+    """Players and the worth of every set of them."""
     count = draw(st.integers(1, 4))
     return PLAYERS[:count], {subset: draw(WORTH) for subset in subsets(count)}
 
@@ -59,14 +59,16 @@ def test_the_order_of_players_does_not_matter(
 
 
 @given(st.lists(WORTH, min_size=5, max_size=5))
-def test_players_that_do_the_same_get_the_same(by_size: list[float]) -> None:
+def test_equal_players_get_equal_shares(by_size: list[float]) -> None:
     found = where.shapley(PLAYERS[:4], lambda subset: by_size[len(subset)])
     shares = [share for share, _, _ in found.values()]
     assert shares == pytest.approx([shares[0]] * 4, abs=1e-6)
 
 
 @given(st.lists(WORTH, min_size=5, max_size=5), WORTH)
-def test_of_sites_that_add_up_each_has_what_it_brings(values: list[float], none: float) -> None:
+def test_sites_whose_contributions_add_up_each_get_their_own_contribution(
+    values: list[float], none: float
+) -> None:
     alone = dict(zip(PLAYERS, values, strict=True))
     found = where.shapley(PLAYERS, lambda subset: none + sum(alone[name] for name in subset))
     for name, (share, first, last) in found.items():
@@ -75,7 +77,7 @@ def test_of_sites_that_add_up_each_has_what_it_brings(values: list[float], none:
         assert last == pytest.approx(share, abs=1e-6)
 
 
-def test_a_site_that_does_nothing_gets_nothing() -> None:
+def test_a_site_without_a_contribution_gets_no_share() -> None:
     found = where.shapley(PLAYERS[:3], lambda subset: float(len(subset - {"table"}) ** 2))
     assert found["table"] == (0.0, 0.0, 0.0)
     assert found["column"] == found["actuator"] == (2.0, 1.0, 3.0)
@@ -104,7 +106,9 @@ def spoilt(cases: Cases, kind: str, effects: hypothesis.Values) -> Data:
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_what_no_effect_explains_is_placed_by_the_signals_that_show_it(cases: Cases, site: str) -> None:
+def test_an_unexplained_residual_is_attributed_to_the_site_of_the_signals_that_show_it(
+    cases: Cases, site: str
+) -> None:
     kind, effects = SITES[site]
     data = spoilt(cases, kind, effects)
     trace = where.unexplained(data, fitting.at(data, {}, np.zeros(len(data.part.nuisances))))
@@ -114,7 +118,7 @@ def test_what_no_effect_explains_is_placed_by_the_signals_that_show_it(cases: Ca
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_the_trace_of_an_effect_is_what_it_changes(cases: Cases, site: str) -> None:
+def test_the_trace_of_an_effect_is_its_change_of_the_prediction(cases: Cases, site: str) -> None:
     kind, effects = SITES[site]
     data = spoilt(cases, kind, effects)
     whole = {name: checked(CATALOGUE[name], values) for name, values in effects.items()}
@@ -125,7 +129,7 @@ def test_the_trace_of_an_effect_is_what_it_changes(cases: Cases, site: str) -> N
     assert trace.signal in data.part.signals
 
 
-def test_when_and_at_which_frequency(cases: Cases) -> None:
+def test_a_trace_gives_its_times_and_its_frequency_band(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
     t = whole.time
     burst: Array = np.where((t >= 2.0) & (t < 5.0), 10.0, 0.0) * np.sin(2.0 * np.pi * 4.0 * t)

@@ -1,4 +1,4 @@
-"""The example's server in a thread, and rigs with scripted answers."""
+"""The example's server in a thread of its own, and rigs with scripted answers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _spec.loader.exec_module(example)
 
 
 def words(channels: Channels) -> str:
-    """The channels as the example's server takes them."""
+    """The channels as a text that the example's server accepts."""
     driving = (channels.command, *([channels.effort] if channels.effort else []))
     return ";".join(f"{row.name} {row.unit}" for row in (*driving, *channels.measured))
 
@@ -50,7 +50,7 @@ Answers = Callable[[int, int, bytes, bytes], list[bytes]]  # kind, count of its 
 
 @contextlib.contextmanager
 def scripted(answers: Answers) -> Iterator[str]:
-    """A rig whose sound answers go through a function; its address."""
+    """The address of a rig whose correct answers pass through a function that may change them."""
     server = example.Server(example.Column)
     counts: dict[int, int] = {}
 
@@ -82,7 +82,7 @@ def scripted(answers: Answers) -> Iterator[str]:
 
 
 def changed(answer: bytes, **fields: Any) -> bytes:
-    """An answer with other fields and its right checksum."""
+    """An answer with changed fields and the checksum that belongs to them."""
     names = [field.name for field in packets.ANSWER if field.name != "values"]
     unpacked = list(example.ANSWER.unpack(answer))
     head, values, tail = unpacked[:8], unpacked[8:16], unpacked[16:]

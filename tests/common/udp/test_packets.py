@@ -17,13 +17,13 @@ from tests.helpers import ROOT
 ARM = Request(Asked.ARM, 7, 5, 0.002, 0.02, 2**64 - 1, 2, packets.number(COLUMN_CHANNELS))
 
 
-def test_both_packets_are_as_long_as_they_are_said_to_be() -> None:
+def test_both_packets_have_their_documented_lengths() -> None:
     for fields in (packets.REQUEST, packets.ANSWER):
         assert packets.layout(fields).size == packets.SIZE
         assert len({field.name for field in fields}) == len(fields)
 
 
-def test_floats_stand_at_multiples_of_eight() -> None:
+def test_the_floats_of_a_packet_are_aligned_to_eight_bytes() -> None:
     for fields in (packets.REQUEST, packets.ANSWER):
         place = 0
         for field in fields:
@@ -52,12 +52,12 @@ def test_the_example_names_the_channels_of_the_table_of_signals() -> None:
     assert f'"{example.CHANNELS}"' in (ROOT / "examples" / "udp_rig.c").read_text()
 
 
-def test_there_is_room_for_every_kind() -> None:
+def test_a_packet_has_room_for_the_channels_of_every_kind() -> None:
     assert all(len(kind.channels.names) <= packets.VALUES for kind in KINDS.values())
 
 
 @pytest.mark.parametrize("place", range(packets.SIZE))
-def test_a_bit_that_is_wrong_anywhere_is_seen_by_both(place: int) -> None:
+def test_both_programs_detect_a_wrong_bit_anywhere(place: int) -> None:
     sent = bytearray(packets.pack(ARM))
     answer = bytearray(example.Server(example.Column).answer(bytes(sent)))
     sent[place] ^= 0x10
@@ -67,18 +67,18 @@ def test_a_bit_that_is_wrong_anywhere_is_seen_by_both(place: int) -> None:
 
 
 @pytest.mark.parametrize("size", [0, 1, packets.CHECKED, packets.SIZE - 1, packets.SIZE + 1])
-def test_a_packet_of_another_length_is_damaged(size: int) -> None:
+def test_a_packet_of_another_length_counts_as_damaged(size: int) -> None:
     answer = example.Server(example.Column).answer(packets.pack(ARM))
     assert packets.fault((answer + answer)[:size]) == "damaged"
     assert example.Server(example.Column).answer((packets.pack(ARM) * 2)[:size]) == b""
 
 
-def test_another_version_is_told_from_damage() -> None:
+def test_a_packet_of_another_version_is_distinguished_from_a_damaged_one() -> None:
     answer = example.Server(example.Column).answer(packets.pack(ARM))
     assert packets.fault(changed(answer, version=2)) == "version"
 
 
-def test_what_a_rig_says_cannot_command_a_terminal() -> None:
+def test_a_rigs_text_cannot_send_control_characters_to_the_terminal() -> None:
     answer = example.Server(example.Column).answer(packets.pack(ARM))
     text = packets.unpack(changed(answer, text=b"\x1b[2Jred\xff")).text
     assert re.fullmatch(r"\[2Jred.", text)

@@ -24,7 +24,7 @@ def sound(_kind: int, _count: int, _packet: bytes, answer: bytes) -> list[bytes]
 
 
 def at(kind: Asked, numbers: set[int], change: Callable[[bytes], list[bytes]]) -> Answers:
-    """Sound answers, but for those to packets of a kind with these numbers, counted from 1."""
+    """Correct answers, except to the packets of a kind with these numbers, counted from 1."""
 
     def answers(of: int, count: int, _packet: bytes, answer: bytes) -> list[bytes]:
         return change(answer) if of == kind and (count in numbers or not numbers) else [answer]
@@ -33,7 +33,7 @@ def at(kind: Asked, numbers: set[int], change: Callable[[bytes], list[bytes]]) -
 
 
 def driven(answers: Answers, commands: int, **terms: Any) -> tuple[UdpRig, list[tuple[float, ...]]]:
-    """A rig that was armed and written so many commands, and what was read after each."""
+    """A rig after arming and this many commands, and its reading after each command."""
     found = []
     with scripted(answers) as address:
         rig = UdpRig(COLUMN_CHANNELS, TERMS._replace(address=address, **terms))
@@ -47,7 +47,7 @@ def driven(answers: Answers, commands: int, **terms: Any) -> tuple[UdpRig, list[
 
 
 def column(commands: int) -> list[tuple[float, float]]:
-    """The same rig in this process."""
+    """The readings of the same rig in this process."""
     rig, found = example.Column(0.002, 3), []
     for number in range(commands):
         rig.write((1e-3 * (number + 1),))
@@ -55,7 +55,7 @@ def column(commands: int) -> list[tuple[float, float]]:
     return found
 
 
-def test_a_sound_rig_is_measured_and_gives_the_numbers_of_the_rig_itself() -> None:
+def test_a_rig_over_udp_gives_the_same_readings_as_in_this_process() -> None:
     rig, found = driven(sound, 20)
     assert found == column(20)
     assert len(rig.echoes.round_trips_s) == udp.ECHOES
@@ -64,7 +64,7 @@ def test_a_sound_rig_is_measured_and_gives_the_numbers_of_the_rig_itself() -> No
     assert rig.missed == 0
 
 
-def test_what_is_missed_is_the_newest_reading_and_what_comes_late_is_used() -> None:
+def test_a_missed_answer_repeats_the_newest_reading_and_a_late_one_is_used() -> None:
     kept: list[bytes] = []
 
     def delayed(_kind: int, _count: int, _packet: bytes, answer: bytes) -> list[bytes]:
@@ -97,7 +97,7 @@ def test_what_is_missed_is_the_newest_reading_and_what_comes_late_is_used() -> N
     ],
     ids=["twice", "old", "ahead", "of another test", "short", "nonsense", "version", "too few numbers"],
 )
-def test_what_does_not_belong_to_the_tick_is_counted_and_changes_nothing(
+def test_an_answer_that_does_not_belong_to_the_tick_is_counted_and_ignored(
     change: Callable[[bytes], list[bytes]], cause: str
 ) -> None:
     rig, found = driven(at(Asked.COMMAND, {3, 4, 5}, change), 9)
@@ -130,7 +130,7 @@ def test_a_rig_without_a_valid_answer_is_given_up_after_the_plans_intervals(
         assert missed == [0, 0, 1, 2]
 
 
-def test_a_tick_never_waits_longer_than_it_may() -> None:
+def test_a_tick_waits_for_an_answer_at_most_the_allowed_time() -> None:
     with scripted(at(Asked.COMMAND, set(), lambda _: [])) as address:
         rig = UdpRig(COLUMN_CHANNELS, TERMS._replace(address=address, wait=2e-3, most=99))
         rig.arm()
@@ -181,7 +181,7 @@ def test_a_rig_that_stops_on_its_own_ends_the_test_with_its_own_words(
     ],
     ids=["not there", "does not arm", "busy", "slow", "numbers", "channels"],
 )
-def test_a_rig_that_is_not_ready_says_why(
+def test_a_rig_that_is_not_ready_gives_its_reason(
     answers: Answers, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(udp, "FIRST_NS", 10_000_000)
@@ -191,17 +191,17 @@ def test_a_rig_that_is_not_ready_says_why(
     assert str(told.value).endswith(".")
 
 
-def test_a_port_at_which_nobody_listens_is_said() -> None:
+def test_a_port_without_a_listener_is_reported() -> None:
     with pytest.raises(RigError, match="nothing answers at udp/9: start the rig's program there"):
         UdpRig(COLUMN_CHANNELS, TERMS._replace(address="udp/9")).arm()
 
 
-def test_a_rig_that_takes_its_time_is_waited_for() -> None:
+def test_a_rig_that_arms_slowly_is_waited_for() -> None:
     slow = at(Asked.ARM, {1, 2}, lambda one: [changed(one, state=RigState.PREPARING)])
     assert driven(slow, 2)[1] == column(2)
 
 
-def test_a_rig_that_gives_readings_at_rest_may_be_read_at_rest() -> None:
+def test_a_rig_that_allows_readings_at_rest_is_read_at_rest() -> None:
     change = at(Asked.ECHO, set(), lambda one: [changed(one, count=2, values=(1.0, 2.0))])
     with scripted(change) as address:
         rig = UdpRig(COLUMN_CHANNELS, TERMS._replace(address=address))
@@ -210,7 +210,7 @@ def test_a_rig_that_gives_readings_at_rest_may_be_read_at_rest() -> None:
         assert [rig.read() for _ in range(3)] == [(1.0, 2.0)] * 3
 
 
-def test_a_rig_that_does_not_confirm_its_stop_is_told_of() -> None:
+def test_a_rig_that_does_not_confirm_that_it_is_disarmed_is_reported() -> None:
     with pytest.raises(RigError, match="it has not confirmed that it is disarmed"):
         driven(at(Asked.DISARM, set(), lambda _: []), 1)
 
@@ -274,6 +274,6 @@ def test_an_address_without_a_host_is_on_this_machine(address: str, found: tuple
 @pytest.mark.parametrize(
     "address", ["tcp/127.0.0.1:9100", "udp/", "udp/0", "udp/70000", "udp/[::1]:9100", "9100", "udp/a:b"]
 )
-def test_what_is_no_address_is_refused_with_the_key(address: str) -> None:
+def test_a_wrong_address_is_refused_and_its_key_is_named(address: str) -> None:
     with pytest.raises(InputError, match=r"address in \[master.rig\] is .*, but must be udp/HOST:PORT"):
         place(address, "[master.rig]")
