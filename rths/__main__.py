@@ -20,6 +20,7 @@ VERBS = {
     "slave": "run laboratory B of a test on several machines",
     "record": "record a test on several machines",
     "live": "show a test while it runs, or its recording, in a browser",
+    "panel": "operate a test from a browser: check, arm, start, stop, reset",
     "start": "begin a test whose armed laboratories wait for it",
     "stop": "stop a running test, in order or at once",
     "reset": "let laboratories leave their latched safe state",
@@ -54,7 +55,7 @@ VERBS = {
 }
 
 FOLDERS = {
-    "rths.perform": ("run", "serve", "live", "start", "stop", "reset"),
+    "rths.perform": ("run", "serve", "live", "panel", "start", "stop", "reset"),
     "rths.prepare": (
         "init",
         "check",
@@ -127,6 +128,7 @@ EXAMPLES = {
     "slave": "rths slave default --connect tcp/192.0.2.1:7447",
     "record": "rths record default --connect tcp/192.0.2.1:7447 -o test.mcap",
     "live": "rths live runs/default-20260101-120000.mcap",
+    "panel": "rths panel default --duration 20",
     "start": "rths start --reason ready",
     "stop": "rths stop --emergency",
     "reset": "rths reset --reason inspected",

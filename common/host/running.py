@@ -36,6 +36,7 @@ class Running(NamedTuple):
     folder: str  # of the plan's relative paths
     plan: str
     role: str = RUN  # `run`, or that of a laboratory that was started by itself
+    recording: str = ""  # its file, empty for a laboratory that was started by itself
 
 
 class Neighbour(NamedTuple):
@@ -58,11 +59,12 @@ def place() -> Path:
 
 
 @contextlib.contextmanager
-def announced(plan: Plan, endpoint: str, role: str = RUN) -> Iterator[None]:
+def announced(plan: Plan, endpoint: str, role: str = RUN, *, recording: Path | None = None) -> Iterator[None]:
     """Register the test while the context lasts; where the file cannot be written, the test runs without it."""
     folder = place()
     path = folder / f"{plan.test.name}-{os.getpid()}.json"
-    entry = Running(plan.test.name, endpoint, str(plan.base.resolve()), plan.toml(), role)
+    there = str(recording.resolve()) if recording else ""
+    entry = Running(plan.test.name, endpoint, str(plan.base.resolve()), plan.toml(), role, there)
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
         folder.chmod(0o755)
@@ -79,7 +81,12 @@ def announced(plan: Plan, endpoint: str, role: str = RUN) -> Iterator[None]:
 
 def found() -> list[Running]:
     """The whole tests of this user whose process is alive; the files of ended ones are removed."""
-    entries = []
+    return [*by_process().values()]
+
+
+def by_process() -> dict[int, Running]:
+    """The same by the number of their processes, the newest last."""
+    entries: list[tuple[float, int, Running]] = []
     for path in sorted(place().glob("*-*.json")):
         try:
             one = neighbour(path)
@@ -87,10 +94,11 @@ def found() -> list[Running]:
                 path.unlink(missing_ok=True)
             if one is None or one.user != os.getuid():
                 continue
-            entries.append(Running(**json.loads(path.read_text(encoding="utf-8"))))
+            entry = Running(**json.loads(path.read_text(encoding="utf-8")))
+            entries.append((one.since, one.process, entry))
         except (OSError, ValueError, TypeError):
             continue
-    return [entry for entry in entries if entry.role == RUN]
+    return {process: entry for _, process, entry in sorted(entries) if entry.role == RUN}
 
 
 def neighbours() -> list[Neighbour]:

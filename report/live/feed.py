@@ -22,6 +22,7 @@ from common.recording.run import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic
 from common.safety.modes import Mode
 from report.facts.laboratories import LaboratoryFacts, laboratories
+from report.live.levels import Levels
 from report.live.standing import Standing
 from report.live.trace import Trace, extremes, largest
 from report.pictures.curves import labs_of
@@ -100,6 +101,7 @@ class Feed:
         self.t = 0.0
         self.interval = 0.0  # s, 0 while it is not known
         self.standing = Standing(clock)
+        self.levels = Levels()
         self.events: deque[dict[str, Any]] = deque(maxlen=EVENTS)
         self.changes = self.happened = 0
         self.failure = ""
@@ -168,8 +170,10 @@ class Feed:
         if self.changes == 1:
             self.laboratories = labs_of(replace(run, metadata=self._metadata))
         for role in (MASTER, *run.roles):
-            self._move(role, run.columns.get(role, {}))
-            self._move(role, run.ramps.get(role, {}))
+            for columns in (run.columns.get(role, {}), run.ramps.get(role, {})):
+                self._move(role, columns)
+                if columns and columns["seq"].size:
+                    self.levels.take(role, columns, run.units.get(role, {}))
         for role in run.roles:
             self._exchange(role, run.columns.get(latency_topic(role), {}))
         for event in run.events:

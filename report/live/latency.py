@@ -44,6 +44,10 @@ class Latency:
         self._shown: tuple[str, int] = ("", -EVERY)
         self.parts = {"trips": trips, "histogram": histogram}
 
+    def forget(self) -> None:
+        """Show the next test's from the begin."""
+        self._shown = ("", -EVERY)
+
     def update(self, feed: Feed, role: str) -> None:
         """Show the histogram of a slave's exchange, and the interval once it is known."""
         timing = feed.timing(role)

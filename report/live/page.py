@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bokeh.document import Document
 from bokeh.events import ConnectionLost
@@ -19,6 +19,9 @@ from report.live.motion import looks, motions
 from report.live.status import ORANGE, Status
 from report.live.stream import Streams
 from report.page import block_of
+
+if TYPE_CHECKING:
+    from report.panel.panel import Panel
 
 TEMPLATE = Path(__file__).with_name("page.html")
 TEXT = {"text_font_size": "12px"}
@@ -46,22 +49,26 @@ THEME = Theme(
 )
 
 
-def parting(feed: Feed) -> Div:
+def parting(feed: Feed, *, panel: bool) -> Div:
     """The sentence that the page shows by itself when the server has ended."""
-    text = str(block_of("live.html", "parting", feed.path))
+    text = str(block_of("live.html", "left" if panel else "parting", feed.path))
     style: dict[str, str | None] = {"color": ORANGE, "font-size": "14px", "overflow-wrap": "anywhere"}
     return Div(text=text, visible=False, sizing_mode="stretch_width", styles=style, name="parting")
 
 
 class Page:
-    """All views in a document, and the choice of the slave where there are several."""
+    """All views in a document, and the choice of the slave where there are several.
 
-    def __init__(self, document: Document, feed: Feed) -> None:
+    With a `panel` its part stands above them, and its feed is followed from test to test.
+    """
+
+    def __init__(self, document: Document, feed: Feed, panel: Panel | None = None) -> None:
         self._document = document
         self._feed = feed
+        self._panel = panel
         self._labs = looks(feed.laboratories)
         self.streams = Streams(feed)
-        self.status = Status()
+        self.status = Status(laboratories=panel is None)
         window = None if feed.whole else feed.window
         self.latency = Latency(self.streams, window)
         self._motions = motions(self.streams, feed.laboratories, window)
@@ -69,7 +76,7 @@ class Page:
         if feed.roles and not all(feed.timing(role).instant for role in feed.roles):
             self.plots |= self.latency.parts
         self._heading = Div(sizing_mode="stretch_width", name="heading")
-        self._parting = parting(feed)
+        self._parting = parting(feed, panel=panel is not None)
         self.slave = Select(title="slave", options=[], visible=False, width=200, name="slave")
         for name, figure in self.plots.items():
             figure.name = name
@@ -99,11 +106,16 @@ class Page:
         document.theme = THEME
         document.template = Template(TEMPLATE.read_text(encoding="utf-8"))
         document.template_variables["plots"] = self.plots
+        document.template_variables["panel"] = self._panel.html() if self._panel else ""
         for model in document.models:  # the ranges that a reader chooses in the browser stay as they are
             model.syncable = model is self.slave
 
     def update(self) -> None:
         """Bring everything up to date, in one message to the browser."""
+        if self._panel is not None and self._panel.feed is not self._feed:
+            self._feed = self._panel.feed
+            self.latency.forget()
+            self.status.forget()
         self._document.hold("collect")
         try:
             self._update(self._feed)
@@ -136,7 +148,8 @@ class Page:
 
     def _head(self, feed: Feed) -> None:
         test = feed.test or feed.path.stem
-        title = f"{test}: {'ended' if feed.ended else 'live'}"
+        state = "ended" if feed.ended else "live"
+        title = f"{test}: {state}" if self._panel is None else "rths panel"
         if title != self._document.title:
             self._document.title = title
         self._heading.text = str(block_of("live.html", "heading", test, feed.path))

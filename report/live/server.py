@@ -1,4 +1,7 @@
-"""The server of a live view: on this machine's loopback alone, with everything the page needs in the package."""
+"""The server of a live view or an operator's panel, with everything the page needs in the package.
+
+A live view is served on this machine's loopback alone, a panel under the name that it is given.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import os
 import time
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING
 
 from bokeh.application import Application
 from bokeh.application.handlers.function import FunctionHandler
@@ -21,42 +25,70 @@ from tornado.ioloop import IOLoop, PeriodicCallback
 from common.errors import InputError
 from report.live.feed import Feed
 from report.live.page import Page
+from report.panel.guard import LOOPBACK, Guard
+from report.panel.handlers import guarded
 
-HOST = "127.0.0.1"
+if TYPE_CHECKING:
+    from report.panel.panel import Panel
+
+MOST_BODY = 1 << 16  # bytes of a request: an order has some hundred
 LINGER_S = 1.5  # s after the end of a test, for the pages to receive it: fifteen updates
 
 
 class Server:
-    """Serves a feed's page at `url`; `rate` (Hz) is how often the feed is read and the pages brought up to date."""
+    """Serves a feed's page at `url`; `rate` (Hz) is how often the feed is read and the pages brought up to date.
 
-    def __init__(self, feed: Feed, port: int, rate: float) -> None:
-        self._feed = feed
+    With a `panel`, made for the port that was found, its feed is shown, and its guard decides who is answered.
+    """
+
+    def __init__(
+        self,
+        feed: Feed | None,
+        port: int,
+        rate: float,
+        *,
+        host: str = LOOPBACK,
+        panel: Callable[[int], Panel] | None = None,
+    ) -> None:
         logging.getLogger("bokeh").setLevel(
             logging.ERROR
         )  # bokeh would warn of every reader who closes the page
         self._period = 1e3 / rate
         try:
-            sockets, self._port = bind_sockets(HOST, port)
+            sockets, self._port = bind_sockets(host, port)
         except OSError as error:
             reason = "it is in use" if error.errno == errno.EADDRINUSE else os.strerror(error.errno or 0)
             raise InputError(
                 f"Cannot serve the live view on port {port}: {reason}; give another port."
             ) from None
-        origins = [f"{HOST}:{self._port}", f"localhost:{self._port}"]  # no other site's page may read along
+        self._panel = panel(self._port) if panel else None
+        self._guard = self._panel.guard if self._panel else Guard(host, self._port)
+        self._still = feed
         pages = {"/": Application(FunctionHandler(self._page))}
+        patterns = self._panel.patterns if self._panel else []
         self._loop = IOLoop.current()
-        self._bokeh = BokehTornado(pages, extra_websocket_origins=origins)
-        self._http = HTTPServer(self._bokeh)
+        # no other site's page may read along
+        self._bokeh = BokehTornado(
+            pages, extra_websocket_origins=sorted(self._guard.hosts), extra_patterns=patterns
+        )
+        self._http = HTTPServer(guarded(self._guard, self._bokeh), max_body_size=MOST_BODY)
         self._http.add_sockets(sockets)
         self._server = BaseServer(self._loop, self._bokeh, self._http)
 
     @property
     def url(self) -> str:
         """The address of the page."""
-        return f"http://{HOST}:{self._port}/"
+        return self._guard.url
+
+    @property
+    def _feed(self) -> Feed:
+        """What the pages show at present."""
+        feed = self._panel.feed if self._panel else self._still
+        assert feed is not None  # noqa: S101 - without a panel a feed is given
+        return feed
 
     def _page(self, document: Document) -> None:
-        page = Page(document, self._feed)
+        page = Page(document, self._feed, self._panel)
         document.add_periodic_callback(page.update, round(self._period))
 
     def run(self, stopping: Callable[[], str], *, leave: bool) -> None:
@@ -74,7 +106,7 @@ class Server:
             self._loop.close()
 
     def _look(self, stopping: Callable[[], str], until: list[float], *, leave: bool) -> None:
-        self._feed.look()
+        (self._panel or self._feed).look()
         now = time.monotonic()
         if leave and self._feed.ended:
             until[0] = min(until[0], now + LINGER_S)

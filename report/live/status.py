@@ -41,17 +41,24 @@ AT_LEVEL = {"info": GREY, "warning": ORANGE, "error": RED}
 class Status:
     """A banner where a laboratory has stopped the test, tiles of facts, the whole state in words, the newest events."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, laboratories: bool = True) -> None:
+        self._laboratories = laboratories  # whether the tiles show them, which a panel does itself
         self.banner = Div(sizing_mode="stretch_width", name="banner", visible=False, styles=dict(LOUD))
         self.tiles = Div(sizing_mode="stretch_width", name="tiles")
         self.events = Div(sizing_mode="stretch_width", name="events")
+        self._listed = -1
+
+    def forget(self) -> None:
+        """List the next test's events from the begin."""
         self._listed = -1
 
     def update(self, feed: Feed, role: str) -> None:
         """Show what is new; `role` is that of the slave whose exchange counts."""
         self.banner.text = banner(feed)
         self.banner.visible = bool(self.banner.text)
-        self.tiles.text = tiles(feed, role)  # the same text again is not sent
+        self.tiles.text = tiles(
+            feed, role, laboratories=self._laboratories
+        )  # the same text again is not sent
         if feed.happened != self._listed:
             self._listed = feed.happened
             self.events.text = listing(feed)
@@ -71,12 +78,12 @@ def banner(feed: Feed) -> str:
     return str(block_of("live.html", "banner", called, causes, latched))
 
 
-def tiles(feed: Feed, role: str) -> str:
+def tiles(feed: Feed, role: str, *, laboratories: bool = True) -> str:
     """The facts as HTML."""
     timing = feed.timing(role)
     share = f" ({percent(timing.late / timing.ticks)})" if timing.ticks else ""
     duration = f" / {feed.plan.test.duration:g}" if feed.plan else ""
-    facts = [(title(lab), *standing(feed, lab)) for lab in feed.labs]
+    facts = [(title(lab), *standing(feed, lab)) for lab in feed.labs if laboratories]
     facts += [
         ("test time", f"{feed.t:.1f}{duration} s", "", ""),
     ]

@@ -37,6 +37,7 @@ def facts(plan: Plan, file: Path) -> dict[str, Any]:
     made = [*found.checks, *built, space.check(plan, existing(Path(plan.recording.folder)))]
     return {
         "plan": str(file),
+        "digest": plan.digest(),
         "test": plan.test.name,
         "duration": plan.test.duration,
         "interval": plan.test.interval,

@@ -29,27 +29,37 @@ def show(facts: Mapping[str, Any]) -> None:
 
 def described(facts: Mapping[str, Any]) -> Iterator[str]:
     """Lines on the test, the building, the transfer systems, the delay and the recording."""
+    first, *others = named(facts)
+    yield f"{first[0]}: {first[1]}"
+    for name, text in others:
+        yield f"{name:<17} {text}"
+
+
+def named(facts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """The same as pairs of a name and a text; the first name is the plan's file."""
     yield (
-        f"{facts['plan']}: test '{facts['test']}', {facts['duration']:g} s in {facts['ticks']} intervals of "
-        f"{facts['interval'] * 1e3:g} ms"
+        facts["plan"],
+        f"test '{facts['test']}', {facts['duration']:g} s in {facts['ticks']} intervals of "
+        f"{facts['interval'] * 1e3:g} ms",
     )
     ground = facts["ground_motion"]
-    yield f"ground motion     {ground['text']}; × {ground['scale']:g}: peak {ground['peak']:.3g} m/s²"
+    yield "ground motion", f"{ground['text']}; × {ground['scale']:g}: peak {ground['peak']:.3g} m/s²"
     if facts["structure"]["model"]:
-        yield f"building          {facts['structure']['model']}; the modes are those of [structure]"
+        yield "building", f"{facts['structure']['model']}; the modes are those of [structure]"
     for number, mode in enumerate(facts["structure"]["modes"], start=1):
-        yield f"mode {number}            {mode_text(mode)}"
+        yield f"mode {number}", mode_text(mode)
     if specimen := facts["structure"].get("specimen"):
         yield (
-            f"specimen          storey {specimen['storey']}, felt as {specimen['stiffness_felt']:.4g} N/m; the "
-            f"building leaves {specimen['stiffness_left_to_it']:.4g} N/m to it"
+            "specimen",
+            f"storey {specimen['storey']}, felt as {specimen['stiffness_felt']:.4g} N/m; the "
+            f"building leaves {specimen['stiffness_left_to_it']:.4g} N/m to it",
         )
     for role, system in facts["transfer_systems"].items():
-        yield f"{role:<17} {system_text(role, system)}"
+        yield role, system_text(role, system)
     for rig in facts["rigs"]:
-        yield f"{rig['where']:<17} {rig_text(rig)}"
-    yield f"delay             {delay_text(facts['delay'])}"
-    yield f"recording         about {facts['recording']['bytes'] / 1e6:.1f} MB in {facts['recording']['folder']}"
+        yield rig["where"], rig_text(rig)
+    yield "delay", delay_text(facts["delay"])
+    yield "recording", f"about {facts['recording']['bytes'] / 1e6:.1f} MB in {facts['recording']['folder']}"
 
 
 def mode_text(mode: Mapping[str, Any]) -> str:

@@ -11,6 +11,7 @@ from common.lab.preflight import PASSED
 from common.protocol.exchange import State
 from common.roles import MASTER, title
 from common.safety.modes import Mode
+from report.text.forwarded import ForwardedProgress
 from report.text.terminal import RunProgress
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ UNSAID = ("patience", "machine", "bare_loop", "mode", "exchange", PASSED)
 def follow(
     processes: Processes,
     ending: Ending,
-    progress: RunProgress,
+    progress: RunProgress | ForwardedProgress,
     stopping: Stopping,
     view: View | None = None,
 ) -> None:
@@ -44,6 +45,8 @@ def follow(
         if said is not None:
             tell(said, progress)
             note(said, ending, doing)
+        if isinstance(progress, ForwardedProgress):
+            progress.alive([name for name in processes.names if name not in processes.ended()])
         if view is not None and (news := view.news()):
             progress.say(news)
         for name in stop(processes, ending, stopping()):
@@ -98,8 +101,11 @@ def end_all(processes: Processes, ending: Ending) -> None:
         stop(processes, ending, "this program failed.")
 
 
-def tell(said: Said, progress: RunProgress) -> None:
-    """Show one report if it is meant for the user."""
+def tell(said: Said, progress: RunProgress | ForwardedProgress) -> None:
+    """Show one report if it is meant for the user, or pass it on to a program."""
+    if isinstance(progress, ForwardedProgress):
+        progress.forward(said.process, said.data)
+        return
     match said.data:
         case {"kind": "progress"} if said.process == MASTER:
             progress.show(said.data)

@@ -21,6 +21,7 @@ import json
 import secrets
 import sys
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,7 +31,7 @@ from common.lab.operation import ORDERS
 from common.link.endpoint import Endpoint
 from common.plan.plan import Plan
 from common.plan.read import parse
-from common.protocol.messages import Answer, Operator
+from common.protocol.messages import Answer, Message, Operator
 from common.roles import OPERATOR, title
 from common.terminal import cli
 from common.terminal.printable import shown
@@ -110,18 +111,66 @@ def gathered(endpoint: Endpoint, plan: Plan, word: str, reason: str, press: int 
 
     `word` is one of `ORDERS`; `press` is the number of the press, by default a new one.
     """
-    wish = Operator(0, plan.digest(), word, press or new_press(), reason)
-    due = set(ORDERS[word].answered_by(plan.roles))
-    answers: dict[str, Answer] = {}
-    deadline, again = time.monotonic() + PATIENCE_S, 0.0
-    while not due <= answers.keys() and time.monotonic() < deadline:
-        if time.monotonic() >= again:
-            again = time.monotonic() + REPEAT_S
-            endpoint.send(wish)
-        received = endpoint.receive(REPEAT_S / 10)
-        if received and isinstance(received.message, Answer) and received.message.press == wish.press:
-            answers[received.role] = received.message
-    return answers
+    orders = Outstanding(endpoint, plan)
+    orders.give(word, reason, press)
+    while not (settled := orders.look(REPEAT_S / 10)):
+        pass
+    return settled[0].answers
+
+
+class Given:
+    """An order that was given: the roles whose answers are `due`, and the answers that have come."""
+
+    def __init__(self, wish: Operator, due: Iterable[str]) -> None:
+        self.wish = wish
+        self.due = tuple(due)
+        self.answers: dict[str, Answer] = {}
+        self.again = 0.0  # when it is sent again
+        self.deadline = time.monotonic() + PATIENCE_S
+
+    @property
+    def silent(self) -> list[str]:
+        """The roles that have not answered."""
+        return [role for role in self.due if role not in self.answers]
+
+    @property
+    def settled(self) -> bool:
+        """Whether all have answered, or the time for it is over."""
+        return not self.silent or time.monotonic() >= self.deadline
+
+
+class Outstanding:
+    """Orders over one link that are under way at the same time, so that none waits for the answers to another."""
+
+    def __init__(self, endpoint: Endpoint, plan: Plan) -> None:
+        self._endpoint, self._plan = endpoint, plan
+        self._given: dict[int, Given] = {}
+
+    def give(self, word: str, reason: str, press: int = 0) -> int:
+        """Give an order, which the next look sends; returns the number of its press."""
+        wish = Operator(0, self._plan.digest(), word, press or new_press(), reason)
+        self._given[wish.press] = Given(wish, ORDERS[word].answered_by(self._plan.roles))
+        return wish.press
+
+    def look(self, timeout: float) -> list[Given]:
+        """Send what is due, take the answers that come within `timeout` s; returns the orders that are settled."""
+        now = time.monotonic()
+        for one in self._given.values():
+            if now >= one.again:
+                one.again = now + REPEAT_S
+                self._endpoint.send(one.wish)
+        received = self._endpoint.receive(timeout)
+        while received is not None:
+            self._take(received.role, received.message)
+            received = self._endpoint.receive()
+        settled = [one for one in self._given.values() if one.settled]
+        for one in settled:
+            del self._given[one.wish.press]
+        return settled
+
+    def _take(self, role: str, message: Message) -> None:
+        if isinstance(message, Answer) and message.press in self._given:
+            self._given[message.press].answers.setdefault(role, message)
 
 
 def show(answers: dict[str, Answer], *, as_json: bool) -> None:

@@ -21,6 +21,7 @@ from common.plan.plan import Plan
 from common.reality.reality import Reality
 from common.roles import MASTER, RECORDER
 from common.terminal import cli
+from report.text.forwarded import ForwardedProgress
 from report.text.progress import Progress as Working
 from report.text.terminal import RunProgress
 from rths.perform.follow import UNSAID, end_all, follow
@@ -60,6 +61,11 @@ def test_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--beside", action="store_true", help="run although another test runs on this machine"
+    )
+    parser.add_argument(
+        "--reports",
+        action="store_true",
+        help="write what the processes report as JSON lines on standard error, for a program that runs this command",
     )
     cli.json_argument(parser, "write the summary as JSON on standard output")
 
@@ -183,12 +189,12 @@ def in_real_time(
 
     check(reality)
     processes = Processes()
-    progress = RunProgress(plan.test.duration)
+    progress = ForwardedProgress() if args.reports else RunProgress(plan.test.duration)
     endpoint = listenable()
     view = None
     ending = Ending(plan)
     try:
-        with running.announced(plan, endpoint):
+        with running.announced(plan, endpoint, recording=output):
             if not args.beside:
                 running.alone()
             warm_up(progress)
@@ -242,7 +248,7 @@ def check(reality: Reality) -> None:
         link_model(reality.of(role))
 
 
-def warm_up(progress: RunProgress) -> None:
+def warm_up(progress: RunProgress | ForwardedProgress) -> None:
     """Compile the kernels before the processes start, where this machine has not done so yet."""
     from models import cache
 

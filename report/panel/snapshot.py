@@ -1,0 +1,54 @@
+"""What is known of plan, machine and test at a moment, for the panel's pages; times in ns of the server's clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from common.plan.plan import Plan
+
+NONE: Mapping[str, Any] = MappingProxyType({})
+
+
+class Looked(NamedTuple):
+    """The newest check of plan or machine: what the command found, or its complaint."""
+
+    found: Mapping[str, Any] = NONE
+    complaint: str = ""
+    at: int = 0  # when it was begun, 0 for never
+    busy: bool = False
+
+
+class Told(NamedTuple):
+    """What the processes of a test have reported to the panel that started it."""
+
+    modes: Mapping[str, tuple[str, int]] = NONE  # by laboratory, and when it came
+    alive: tuple[str, ...] = ()  # the processes that ran
+    alive_at: int = 0
+    causes: tuple[tuple[str, str], ...] = ()  # laboratory and sentence, the first first
+    said: tuple[str, ...] = ()  # other lines, the newest last
+
+
+class Shown(NamedTuple):
+    """The test that runs on this machine."""
+
+    test: str  # a name of its own: that of the plan and the number of its process
+    name: str
+    plan: Plan
+    digest: str
+    recording: Path | None
+    own: bool  # whether this panel has started it
+    reached: bool  # whether the operator's link to it is open
+    told: Told = Told()
+
+
+class Snapshot(NamedTuple):
+    """Everything at a moment."""
+
+    file: str  # of the plan that can be armed
+    shown: Shown | None = None
+    plan: Looked = Looked()
+    machine: Looked = Looked()
+    last: tuple[str, ...] = ()  # the last words of the newest test that this panel started, once it has ended

@@ -1,0 +1,193 @@
+"""What a page of the panel shows, as plain values; what can grow old has its age (s) at the moment of the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from common.host.clock import Clock
+from common.roles import MASTER, name_of, title
+from common.safety.modes import LATCHED, Mode
+from report.live.feed import Feed
+from report.live.levels import limits
+from report.live.standing import GRAVEST
+from report.panel.desk import Desk
+from report.panel.snapshot import Looked, Shown, Snapshot
+from report.panel.words import WORDS
+from report.plan import text as plan_text
+from report.text.formats import quantity
+
+MOVING = frozenset(
+    {Mode.RUNNING.value, Mode.HOLDING.value, Mode.RAMPING.value}
+)  # a laboratory then records rows
+LOUD = {
+    Mode.HOLDING.value: "warn",
+    Mode.RAMPING.value: "warn",
+    Mode.SAFE.value: "bad",
+    Mode.EMERGENCY_STOP.value: "bad",
+}
+GONE, LEFT, UNKNOWN = "no process", "left", "not known"
+CAUSES = 4  # that are shown: one for each laboratory of a usual test
+
+
+class View:
+    """Everything that a page shows; `clock` is that of the server."""
+
+    def __init__(self, desk: Desk, clock: Clock) -> None:
+        self._desk, self._clock = desk, clock
+
+    def state(self, snapshot: Snapshot, feed: Feed, session: str) -> dict[str, Any]:
+        """The state for one page."""
+        shown = snapshot.shown
+        labs = [self._lab(role, shown, feed) for role in (MASTER, *shown.plan.roles)] if shown else []
+        return {
+            "seen": self._clock.now() // 1_000_000,
+            "page": self._desk.page(session),
+            "test": test(shown, feed) if shown else None,
+            "phase": phase(snapshot, labs, feed),
+            "labs": labs,
+            "causes": causes(shown, feed),
+            "bars": list(bars(feed)),
+            "plan": self._plan(snapshot),
+            "machine": self._machine(snapshot.machine),
+            "said": list(shown.told.said if shown else ()),
+            "orders": [self._order(entry, session) for entry in self._desk.newest],
+        }
+
+    def _seconds(self, at: int) -> float:
+        """The age of what was at a time (ns), s."""
+        return max(self._clock.now() - at, 0) * 1e-9
+
+    def _lab(self, role: str, shown: Shown, feed: Feed) -> dict[str, Any]:
+        """The mode of a laboratory, by the newest that is known of it."""
+        told = shown.told
+        measured = feed.standing.age(role) if feed.standing.last(role) is not None else None
+        mode, age, note = feed.standing.modes.get(role, UNKNOWN), measured, ""
+        if role in told.modes:
+            mode, at = told.modes[role]
+            still = mode not in MOVING
+            age = (
+                self._seconds(told.alive_at)
+                if still
+                else measured
+                if measured is not None
+                else self._seconds(at)
+            )
+            if role not in told.alive and told.alive_at > at:
+                in_order = mode == Mode.IDLE.value  # as after every end in which its rig came to rest
+                mode, note = LEFT if in_order else GONE, f"it was {mode.replace('_', ' ')}"
+        elif shown.own:
+            mode, age = "starting", self._seconds(told.alive_at) if role in told.alive else None
+        if mode in {one.value for one in LATCHED}:
+            note = "latched until Reset"
+        said = mode.replace("_", " ")
+        loud = "bad" if mode == GONE else LOUD.get(mode, "")
+        return {"role": role, "title": title(role), "mode": said, "loud": loud, "age": age, "note": note}
+
+    def _plan(self, snapshot: Snapshot) -> dict[str, Any]:
+        """The plan that can be armed, as `rths check` describes it."""
+        looked, found = snapshot.plan, snapshot.plan.found
+        (_, text), *others = plan_text.named(found) if found else [("", "")]
+        peaks = [
+            {
+                "name": name.replace("_", " "),
+                "now": quantity(one["peak"], one["unit"]),
+                "limit": quantity(one["limit"], one["unit"]),
+                "share": one["share"],
+            }
+            for name, one in (found["peaks"].items() if found else ())
+            if one["limit"] is not None
+        ]
+        return {
+            "file": snapshot.file,
+            "digest": found.get("digest", ""),
+            "ready": bool(found.get("ready")),
+            "facts": [("test", text), *others] if found else [],
+            "peaks": peaks,
+            "concerns": list(plan_text.concerns(found)) if found else [],
+            **self._looked(looked),
+        }
+
+    def _machine(self, looked: Looked) -> dict[str, Any]:
+        """What this machine lacks, as `rths doctor` says it."""
+        found = looked.found
+        lacks = [
+            {"name": one["name"], "found": one["found"], "needed": one["needed"], "advice": one["advice"]}
+            for one in found.get("checks", ())
+            if not one["passed"]
+        ]
+        said = found["verdict"]["sentence"] if found else ""
+        return {"lacks": lacks, "verdict": said, **self._looked(looked)}
+
+    def _looked(self, looked: Looked) -> dict[str, Any]:
+        age = self._seconds(looked.at) if looked.at else None
+        return {"busy": looked.busy, "complaint": looked.complaint, "age": age}
+
+    def _order(self, entry: Any, session: str) -> dict[str, Any]:
+        own, outcome = entry.request.session == session, entry.outcome
+        word = WORDS[entry.request.word].label if entry.request.word in WORDS else entry.request.word
+        return {
+            "number": entry.request.number if own else 0,
+            "page": entry.page,
+            "word": word,
+            "state": outcome.state,
+            "text": outcome.text,
+            "age": self._seconds(entry.at),
+        }
+
+
+def test(shown: Shown, feed: Feed) -> dict[str, Any]:
+    """The test that runs."""
+    return {
+        "id": shown.test,
+        "name": shown.name,
+        "digest": shown.digest,
+        "recording": str(shown.recording or ""),
+        "own": shown.own,
+        "reached": shown.reached,
+        "t": feed.t,
+        "duration": shown.plan.test.duration,
+    }
+
+
+def phase(snapshot: Snapshot, labs: list[dict[str, Any]], feed: Feed) -> str:
+    """The state of everything in a few words: that of the laboratory that is farthest from running."""
+    if snapshot.shown is None:
+        return f"No test runs. The last one {feed.state}" if feed.ended else "No test runs"
+    modes = {lab["mode"] for lab in labs}
+    if GONE in modes or modes == {LEFT}:
+        return "a laboratory has no process" if GONE in modes else "the laboratories have left"
+    words = [mode.value.replace("_", " ") for mode in GRAVEST]
+    return next((word for word in words if word in modes), "starting")
+
+
+def causes(shown: Shown | None, feed: Feed) -> list[dict[str, str]]:
+    """What stopped the test: laboratory, test time and sentence of each cause."""
+    found = [
+        {"lab": title(one.lab), "t": f"t = {one.t:.2f} s", "text": one.text} for one in feed.standing.stops
+    ]
+    told = shown.told.causes if shown else ()
+    return (found or [{"lab": title(lab), "t": "", "text": text} for lab, text in told])[:CAUSES]
+
+
+def bars(feed: Feed) -> Iterator[dict[str, Any]]:
+    """The limits beside the measured values."""
+    plan = feed.plan
+    if plan is None or not feed.changes:
+        return
+    for lab in feed.laboratories:
+        age = None if feed.ended else feed.standing.age(lab.topic)
+        for name, limit in limits(plan, lab).items():
+            level = feed.levels.of(lab.topic, name)
+            if level is None:
+                continue
+            unit = feed.levels.units[lab.topic, name]
+            where = f" of {name_of(lab.role)}" if name_of(lab.role) else lab.letter
+            yield {
+                "name": f"{name.replace('_', ' ')}{where}",
+                "now": quantity(level.now, unit),
+                "limit": quantity(limit, unit),
+                "share": level.lately / limit if limit else 0.0,
+                "most": level.most / limit if limit else 0.0,
+                "age": age,
+            }

@@ -1,0 +1,344 @@
+"""Carries out the orders of the panel in a thread of its own, which also watches the test that runs on this machine.
+
+Orders to laboratories go over the operator's link, as those of `rths stop` do, and none waits for the answers to
+another. The link is opened as soon as a test is there, so that a stop takes milliseconds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from queue import Empty, Queue
+from typing import NamedTuple
+
+from common.errors import RthsError
+from common.host import running
+from common.host.running import Running
+from common.lab.operation import EMERGENCY, STOP
+from common.link.endpoint import Endpoint
+from common.plan.plan import Plan
+from common.plan.read import parse
+from common.roles import title
+from common.safety.modes import Mode
+from report.panel.desk import DONE, REFUSED, UNHEARD, Outcome, Present
+from report.panel.snapshot import Looked, Shown, Snapshot
+from report.panel.words import ARM, CHECK, MACHINE
+from rths.panel.child import Check, RunCommand
+from rths.perform.operate import PATIENCE_S, Given, Outstanding, line
+
+TURN_S = 0.01  # s between two turns: an order waits no longer for its turn
+LOOK_S = 0.3  # s between two looks for tests on this machine
+STOPS = (STOP, EMERGENCY)
+STILL = frozenset({Mode.IDLE.value, Mode.CONFIGURED.value, Mode.ARMED.value})  # in which nothing has moved
+BUSY = "A test runs, which a check would disturb."
+
+
+class Job(NamedTuple):
+    """An order that was handed over, and where its outcome is awaited."""
+
+    word: str
+    digest: str
+    reason: str
+    settled: Future[Outcome]
+    until: float  # s, when it is given up for want of a link
+
+
+class Options(NamedTuple):
+    """What the panel was started with: the plan with its options, and the words of the commands that use it."""
+
+    load: Callable[[], Plan]
+    file: str
+    plan: Sequence[str]  # the plan and the options that change it
+    run: Sequence[str]  # further options of `rths run`
+    doctor: Sequence[str]  # options of `rths doctor`
+
+
+class Reached:
+    """A test on this machine, and the operator's link to it once that is open."""
+
+    def __init__(self, process: int, entry: Running, opener: ThreadPoolExecutor) -> None:
+        self.entry = entry
+        self.plan = parse(entry.plan, Path(entry.folder))
+        self.test = named(entry.test, process)
+        self.orders: Outstanding | None = None
+        self._endpoint: Endpoint | None = None
+        self._opener = opener
+        self._opening: Future[Endpoint] | None = None
+
+    def open(self) -> None:
+        """Open the link, attempt after attempt."""
+        if self.orders is not None:
+            return
+        if self._opening is None:
+            self._opening = self._opener.submit(line, self.plan, self.entry.endpoint)
+        elif self._opening.done():
+            opening, self._opening = self._opening, None
+            with contextlib.suppress(RthsError):  # the master does not listen yet
+                self._endpoint = opening.result()
+                self.orders = Outstanding(self._endpoint, self.plan)
+
+    def close(self) -> None:
+        """Close the link."""
+        if self._opening is not None:
+            self._opening.add_done_callback(closed)
+        if self._endpoint is not None:
+            self._endpoint.close()
+
+
+class Hands:
+    """The panel's hands; `snapshot` and `present` may be read from any thread."""
+
+    def __init__(self, options: Options) -> None:
+        self._options = options
+        self._queue: Queue[Job] = Queue()
+        self._waiting: list[Job] = []  # for a link
+        self._given: dict[int, Job] = {}  # by press
+        self._reached: Reached | None = None
+        self._command: RunCommand | None = None
+        self._armed: Plan | None = None  # the plan with which the command was started
+        self._arming: Job | None = None
+        self._checks: dict[str, tuple[Check, Job]] = {}
+        self._looked = {CHECK: Looked(), MACHINE: Looked()}
+        self._last: tuple[str, ...] = ()
+        self._shown: Shown | None = None
+        self._sought = 0.0
+        self._closing = threading.Event()
+        self._opener = ThreadPoolExecutor(1)
+        self._thread = threading.Thread(target=self._run, name="hands")
+        self._thread.start()
+
+    # -- what others see --------------------------------------------------------------------------
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """Everything at this moment."""
+        looked = self._looked
+        return Snapshot(self._options.file, self._shown, looked[CHECK], looked[MACHINE], self._last)
+
+    @property
+    def present(self) -> Present:
+        """The test that runs, and the digests of its plan and of the plan that was checked."""
+        shown, armable = self._shown, str(self._looked[CHECK].found.get("digest", ""))
+        return Present(shown.test, shown.digest, armable) if shown else Present(armable=armable)
+
+    def carry_out(self, word: str, digest: str, reason: str) -> Future[Outcome]:
+        """Begin with an order at the next turn."""
+        settled: Future[Outcome] = Future()
+        self._queue.put(Job(word, digest, reason, settled, time.monotonic() + PATIENCE_S))
+        return settled
+
+    def close(self) -> str:
+        """End the thread; what a test that goes on needs to be told of, in a sentence, or an empty text."""
+        self._closing.set()
+        self._thread.join()
+        self._opener.shutdown()
+        if self._command is None or self._command.over:
+            return ""
+        if {mode for mode, _ in self._command.told.modes.values()} <= STILL:
+            self._command.interrupt()
+            return "The armed test was not started, and is asked to end."
+        return "The test goes on as planned: `rths stop` ends it, and `rths panel` finds it again."
+
+    # -- the thread -------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            self._turn()
+        for check, _ in self._checks.values():
+            check.end()
+        if self._reached is not None:
+            self._reached.close()
+
+    def _turn(self) -> None:
+        with contextlib.suppress(Empty):
+            self._begin(self._queue.get(block=not self._linked, timeout=TURN_S))
+            while True:
+                self._begin(self._queue.get_nowait())
+        self._follow_command()
+        self._follow_checks()
+        if time.monotonic() - self._sought >= LOOK_S:
+            self._sought = time.monotonic()
+            self._seek()
+        self._exchange()
+        self._shown = self._present_test()
+
+    @property
+    def _linked(self) -> bool:
+        return self._reached is not None and self._reached.orders is not None
+
+    def _begin(self, job: Job) -> None:
+        match job.word:
+            case _ if job.word in (CHECK, MACHINE):
+                self._check(job)
+            case _ if job.word == ARM:
+                self._arm(job)
+            case _ if job.word in STOPS and not self._linked and self._command is not None:
+                self._command.interrupt()
+                text = (
+                    "The test's command ends it in order, as by Ctrl-C: its laboratories are not linked yet."
+                )
+                job.settled.set_result(Outcome(DONE, text))
+            case _:
+                self._waiting.append(job)
+
+    # -- checks -----------------------------------------------------------------------------------
+
+    def _check(self, job: Job) -> None:
+        if self._command is not None or self._reached is not None:
+            job.settled.set_result(Outcome(REFUSED, BUSY))
+            return
+        if self._checks:
+            job.settled.set_result(Outcome(REFUSED, "A check is under way already."))
+            return
+        words = {CHECK: ["check", *self._options.plan], MACHINE: ["doctor", *self._options.doctor]}
+        check = Check(words[job.word])
+        self._checks[job.word] = check, job
+        self._looked = {**self._looked, job.word: check.busy}
+
+    def _follow_checks(self) -> None:
+        for word, (check, job) in list(self._checks.items()):
+            if (found := check.found) is None:
+                continue
+            del self._checks[word]
+            self._looked = {**self._looked, word: found}
+            if found.complaint:
+                job.settled.set_result(Outcome(REFUSED, found.complaint))
+            else:
+                job.settled.set_result(Outcome(DONE, "See what was found."))
+
+    # -- the test's command -----------------------------------------------------------------------
+
+    def _arm(self, job: Job) -> None:
+        complaint = self._not_to_arm(job)
+        if complaint:
+            job.settled.set_result(Outcome(REFUSED, complaint))
+            return
+        self._arming = job
+        self._last = ()
+        self._command = RunCommand([*self._options.plan, *self._options.run])
+
+    def _not_to_arm(self, job: Job) -> str:
+        """Why no test is armed, empty where one is."""
+        if self._command is not None or self._reached is not None:
+            return "A test runs already."
+        if self._checks:
+            return "A check is under way."
+        try:
+            self._armed = self._options.load()
+        except RthsError as error:
+            return str(error)
+        if self._armed.digest() != job.digest:
+            return "The plan has changed since it was checked: check it again."
+        return ""
+
+    def _follow_command(self) -> None:
+        command, arming = self._command, self._arming
+        if command is None:
+            return
+        if arming is not None and command.ready:
+            self._arming = None
+            arming.settled.set_result(
+                Outcome(DONE, "All laboratories are armed; nothing moves before Start.")
+            )
+        if command.over:
+            told = command.told
+            self._last = tuple(f"{title(lab)}: {text}" for lab, text in told.causes) or told.said[-1:]
+            self._command = None
+            if arming is not None and self._arming is not None:
+                self._arming = None
+                arming.settled.set_result(Outcome(REFUSED, " ".join(told.said[-1:]) or "The test ended."))
+
+    # -- the laboratories -------------------------------------------------------------------------
+
+    def _seek(self) -> None:
+        """Find the test of this machine: the panel's own, or else the newest."""
+        found = running.by_process()
+        own = self._command.process if self._command else 0
+        process = own if own in found else next(reversed(found), 0) if not own else 0
+        entry = found.get(process)
+        if self._reached is not None and (entry is None or named(entry.test, process) != self._reached.test):
+            self._reached.close()
+            self._reached = None
+        if entry is not None and self._reached is None:
+            with contextlib.suppress(RthsError):  # its plan needs what is not there any more
+                self._reached = Reached(process, entry, self._opener)
+                self._same_plan(self._reached)
+
+    def _same_plan(self, reached: Reached) -> None:
+        """End a test of the panel's own whose plan is not the one that was checked and shown."""
+        if self._command is None or self._armed is None or reached.plan.digest() == self._armed.digest():
+            return
+        self._command.interrupt()
+        if self._arming is not None:
+            text = "The plan has changed since it was checked: the test is ended before anything moves."
+            self._arming.settled.set_result(Outcome(REFUSED, text))
+            self._arming = None
+
+    def _exchange(self) -> None:
+        """Send orders and take the answers to them."""
+        if self._reached is not None:
+            self._reached.open()
+        orders = self._reached.orders if self._reached else None
+        for job in list(self._waiting):
+            if orders is not None:
+                self._waiting.remove(job)
+                self._given[orders.give(job.word, job.reason)] = job
+            elif time.monotonic() >= job.until:
+                self._waiting.remove(job)
+                job.settled.set_result(Outcome(UNHEARD, "There is no link to the laboratories."))
+        if orders is not None:
+            for given in orders.look(TURN_S):
+                self._given.pop(given.wish.press).settled.set_result(outcome(given))
+        elif self._given:
+            for job in self._given.values():
+                job.settled.set_result(
+                    Outcome(UNHEARD, "The test ended before all laboratories had answered.")
+                )
+            self._given = {}
+
+    def _present_test(self) -> Shown | None:
+        """The test that the pages show."""
+        command, reached = self._command, self._reached
+        if reached is not None:
+            entry, plan = reached.entry, reached.plan
+            own = command is not None and named(entry.test, command.process) == reached.test
+            shown = Shown(
+                reached.test, entry.test, plan, plan.digest(), None, own, reached.orders is not None
+            )
+            shown = shown._replace(recording=Path(entry.recording) if entry.recording else None)
+            return shown._replace(told=command.told) if own and command is not None else shown
+        if command is None or self._armed is None:
+            return None
+        name = self._armed.test.name
+        test = named(name, command.process)
+        return Shown(test, name, self._armed, self._armed.digest(), None, True, False, command.told)
+
+
+def closed(opening: Future[Endpoint]) -> None:
+    """Close a link that was opened too late to be used."""
+    if opening.exception() is None:
+        opening.result().close()
+
+
+def named(test: str, process: int) -> str:
+    """The name of a test that no other on this machine has had lately."""
+    return f"{test}-{process}"
+
+
+def outcome(given: Given) -> Outcome:
+    """What became of an order to the laboratories."""
+    answers = [
+        f"{title(role)}: {'' if one.accepted else 'refused: '}{one.text}"
+        for role, one in given.answers.items()
+    ]
+    if given.silent:
+        who = " and the ".join(map(title, given.silent))
+        return Outcome(
+            UNHEARD, " ".join([f"No answer came from the {who} within {PATIENCE_S:g} s.", *answers])
+        )
+    accepted = all(one.accepted for one in given.answers.values())
+    return Outcome(DONE if accepted else REFUSED, " ".join(answers))
