@@ -130,14 +130,14 @@ def largest(values: object) -> float:
 
 
 def patient(folder: Path) -> Path:
-    """A file with the default test, which no machine that is held up ends."""
+    """A file with the default test and limits that a paused machine does not exceed."""
     path = folder / "patient.toml"
     path.write_text(PATIENT)
     return path
 
 
 def running(test: Plan, ticks: int) -> VirtualTest:
-    """A test in virtual time in which all laboratories have made so many ticks; it stands still there."""
+    """A test in virtual time that stops after this many ticks of all laboratories."""
     bench = virtual.assemble(test, as_planned(test), None)
     virtual.play(bench, pause=lambda: all(loop.ticks >= ticks for loop in bench.loops.values()))
     return bench

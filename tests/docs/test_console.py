@@ -1,4 +1,4 @@
-"""The runner of the documents: it runs the commands of a page and finds each difference from the text."""
+"""The runner of documents runs the commands of a page and finds each difference from the text."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from docs import console
 
 
 def page(folder: Path, text: str) -> list[str]:
-    """Where a page and its commands part."""
+    """The places at which the commands of a page print something else than the page shows."""
     path = folder / "page.md"
     path.write_text(text, encoding="utf-8")
     (folder / "run").mkdir()
@@ -32,20 +32,20 @@ def test_a_wrong_output_is_found_with_its_line_and_both_texts(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("lines", [["one"], ["one", "two", "three"], [], ["two", "one"], ["one", "tw"]])
-def test_a_line_more_or_less_or_elsewhere_is_found(tmp_path: Path, lines: list[str]) -> None:
+def test_an_added_missing_or_moved_line_is_found(tmp_path: Path, lines: list[str]) -> None:
     assert len(page(tmp_path, shown("$ printf 'one\\ntwo\\n'", *lines))) == 1
 
 
-def test_standard_error_counts_as_printed(tmp_path: Path) -> None:
+def test_standard_error_is_compared_with_the_page(tmp_path: Path) -> None:
     assert page(tmp_path, shown("$ echo trouble >&2", "trouble")) == []
 
 
-def test_lines_of_progress_are_those_of_a_slow_machine(tmp_path: Path) -> None:
+def test_progress_lines_are_left_out_of_the_comparison(tmp_path: Path) -> None:
     lines = "running: ticks, 12 of 20, 5 s\\ndiagnosing: 9 s\\none\\nbroken: 3 m\\n"
     assert page(tmp_path, shown(f"$ printf '{lines}' >&2", "one", "broken: 3 m")) == []
 
 
-def test_a_line_of_progress_takes_its_empty_line_along(tmp_path: Path) -> None:
+def test_the_empty_line_after_a_progress_line_is_left_out(tmp_path: Path) -> None:
     assert page(tmp_path, shown("$ printf 'diagnosing: 9 s\\n\\nfound\\n'", "found")) == []
 
 
@@ -67,7 +67,7 @@ def test_a_command_that_ends_the_shell_is_found(tmp_path: Path) -> None:
     assert page(tmp_path, shown("$ exit 0", "$ echo after", "after"))
 
 
-def test_a_command_may_go_on_over_lines_and_share_its_shell(tmp_path: Path) -> None:
+def test_a_command_may_span_lines_and_share_its_shell(tmp_path: Path) -> None:
     assert page(tmp_path, shown("$ for i in 1 2", "> do echo $i; done", "1", "2", "$ echo $i", "2")) == []
 
 
@@ -117,7 +117,7 @@ def test_a_terminal_that_no_block_follows_is_awaited(tmp_path: Path) -> None:
     assert len(page(tmp_path, f"<!-- terminal: last -->\n{shown('$ echo b', 'a')}")) == 1
 
 
-def test_what_hangs_is_ended_with_all_that_it_started(
+def test_a_command_that_hangs_is_ended_with_its_child_processes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(console, "TIMEOUT_S", 0.2)
@@ -136,11 +136,11 @@ def test_a_console_block_that_begins_with_output_is_refused(tmp_path: Path) -> N
         page(tmp_path, shown("output", "$ true"))
 
 
-def test_the_page_has_a_home_and_a_place_for_temporary_files_of_its_own(tmp_path: Path) -> None:
+def test_a_page_has_its_own_home_and_temporary_folder(tmp_path: Path) -> None:
     assert page(tmp_path, shown('$ test "$HOME" = "$PWD/.home" && test "$TMPDIR" = "$PWD/.tmp"')) == []
 
 
-def test_the_command_runs_pages_and_says_where_they_part(
+def test_the_command_runs_pages_and_prints_where_they_differ(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     good, bad = tmp_path / "good.md", tmp_path / "bad.md"

@@ -132,7 +132,7 @@ def test_every_command_that_is_not_run_is_listed_here() -> None:
     assert {name: lines for name, path in zip(NAMES, PAGES, strict=True) if (lines := unrun(path))} == UNRUN
 
 
-def test_a_command_in_a_block_that_is_not_run_is_seen(tmp_path: Path) -> None:
+def test_a_command_in_a_block_that_is_not_run_is_detected(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(
         "    rths run\n\n```sh\n$ make test  # all\n```\n\n```\nRTHS_SOAK=6 make faults\nrths: no\n```\n\n"
@@ -151,14 +151,14 @@ def test_a_file_that_a_page_has_written_is_named_in_its_text(name: str) -> None:
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_the_example_of_a_command_is_one_that_it_takes(verb: str) -> None:
+def test_the_example_in_a_commands_help_is_accepted_by_the_command(verb: str) -> None:
     program, name, *words = shlex.split(EXAMPLES[verb].partition(" >")[0])
     assert (program, name) == ("rths", verb)
     parser_for(verb).parse_args(words)
 
 
 @pytest.mark.parametrize("name", ["my_lab.py", "my_test.toml"])
-def test_the_laboratory_of_the_page_is_the_example_that_ships(name: str) -> None:
+def test_the_laboratory_on_the_page_equals_the_shipped_example(name: str) -> None:
     shown = {block.name: block.text for block in found(ROOT / "docs/how-to/own-laboratory.md")}
     assert shown[name] == (ROOT / "examples" / name).read_text(encoding="utf-8")
 

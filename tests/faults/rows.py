@@ -1,4 +1,4 @@
-"""The fault matrix F01 to F56: what each row must show, and the results that its table in the docs is made of.
+"""The fault matrix F01 to F56: what each row must show, and the results that make its table in the docs.
 
 A test of a row says what happened with `passed`; where `RTHS_FAULT_ROWS` names a file, the row is appended to it, and
 `python -m tests.faults.rows ROWS.jsonl docs/reference/faults.md` makes the table of all 56.
@@ -53,7 +53,7 @@ def passed(
 
 
 def motion_after(run: Run, role: str, tick: int) -> float:
-    """How far a laboratory's displacement commands went from that of a tick after it, m; the ramp included."""
+    """The largest change of a laboratory's displacement command after a tick, ramp included, m."""
     name = COMMANDS[kind_of(role)]
     columns, ramp = run.columns[role], run.ramps.get(role, {})
     last = columns[name][np.searchsorted(columns["seq"], tick, side="right") - 1]

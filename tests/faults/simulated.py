@@ -36,7 +36,7 @@ BETWEEN = {SLAVE: (MASTER, SLAVE), MASTER: (SLAVE, MASTER)}  # by who hears: fro
 
 
 class Scene:
-    """A test in wait: faults are laid at its ticks before it is played."""
+    """A test before it is played; faults are scheduled at its ticks."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class Scene:
         self.simulation.world.at(0, self._look)
 
     def at(self, tick: float, action: Callable[..., None], *arguments: Any) -> None:
-        """Let something happen a little before a tick."""
+        """Schedule an action a little before a tick."""
         self._laid.append((tick, action, arguments))
 
     def _look(self) -> None:
@@ -78,14 +78,14 @@ class Scene:
         return process.reached(lab.start_ns) + round(tick * lab.interval_ns)
 
     def route(self, hearer: str, channel: str = TICK) -> WireRoute:
-        """The way to a laboratory from the other one."""
+        """The route to a laboratory from the other one."""
         there = self.simulation.wire.between(*BETWEEN[hearer])
         return next(one for one in there if one.route.channel == channel)
 
     def impair(
         self, tick: float, ticks: float, conditions: Conditions, *hearers: str, channel: str = TICK
     ) -> None:
-        """Lay conditions on the ways to some laboratories, both where none is named, for some ticks."""
+        """Set link conditions on the routes to some laboratories (both where none is named) for some ticks."""
         for hearer in hearers or (SLAVE, MASTER):
             route = self.route(hearer, channel)
             self.at(tick, route.lay, (tick, conditions), conditions)
@@ -119,7 +119,7 @@ class Scene:
 
 
 class Relay:
-    """Stands on a route and hands on other frames than those that come."""
+    """Stands on a route and may replace the frames that pass."""
 
     def __init__(
         self, route: WireRoute, changed: Callable[[Any], Message | bytes | None], plan: Plan
@@ -143,7 +143,7 @@ class Relay:
 
 
 def whole(message: Message) -> bool:
-    """Whether the codec takes a message."""
+    """Whether the codec accepts a message."""
     return all(math.isfinite(value) for value in message if isinstance(value, float))
 
 
@@ -153,7 +153,7 @@ def signed(payload: bytes, key: codec.Key) -> bytes:
 
 
 class Account(NamedTuple):
-    """What became of the messages of one direction, by number; the wire's counts beside those of its receiver."""
+    """How many messages of one direction were used, rejected or lost; the wire's counts and the receiver's."""
 
     sent: int
     used: int
@@ -336,7 +336,7 @@ def same_commands(first: Course, second: Course) -> bool:
 
 
 def longest_silence(course: Course, role: str) -> int:
-    """Most ticks in a row in which a laboratory used no newer message, both numbers of it ahead."""
+    """The longest run of ticks in which a laboratory used no newer message."""
     log = course.simulation.probes[MASTER].log.used if role == MASTER else None
     numbers = (
         [row[0] for row in log]

@@ -30,7 +30,7 @@ OTHER = {SLAVE: MASTER, MASTER: SLAVE}
 
 
 def with_wrong(path: Path, role: str, kind: str, place: int, by: float = 0.0, **tables: Any) -> Course:
-    """A test of which one sensor is wrong from a tick on."""
+    """A test in which one sensor is wrong from a tick on."""
     scene = Scene(path, tables=tables)
     probe = scene.simulation.probes[role]
     scene.at(AT, probe.set_wrong, "it", Wrong(kind, place, by))
@@ -38,11 +38,11 @@ def with_wrong(path: Path, role: str, kind: str, place: int, by: float = 0.0, **
 
 
 def worst(stops: list[Stop]) -> Stop:
-    """The latest and the farthest of several."""
+    """The longest times and the largest motions of several stops."""
     return Stop(*map(max, *stops))
 
 
-def test_f37_a_sensor_that_gives_no_number_or_always_the_same(tmp_path: Path) -> None:
+def test_f37_a_sensor_that_gives_nan_or_always_the_same_value(tmp_path: Path) -> None:
     stops: dict[str, list[Stop]] = {"nan": [], "frozen": []}
     for role, channels in CHANNELS.items():
         for place, channel in enumerate(channels):
@@ -91,7 +91,7 @@ def test_f38_a_force_beyond_its_limit(tmp_path: Path) -> None:
 
 
 def slower(plan: Plan) -> Reality:
-    """An actuator that hardly follows."""
+    """An actuator with a time constant so long that it hardly follows."""
     return replace(as_planned(plan), plan=with_table(plan, "actuator", time_constant=0.4))
 
 
@@ -150,7 +150,7 @@ def test_f40_an_unstable_loop(tmp_path: Path) -> None:
 STALLS = (0.020, 0.050, 0.200)
 
 
-def test_f42_a_loop_that_stands_still(tmp_path: Path) -> None:
+def test_f42_a_loop_that_stalls(tmp_path: Path) -> None:
     stops, shown = [], []
     for role in (MASTER, SLAVE):
         for seconds in STALLS:

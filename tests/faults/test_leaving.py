@@ -21,7 +21,7 @@ STEP = 10_000_000  # ns between two looks at whether the master is still there
 
 
 def slow(probe: Probe, *modes: Mode) -> None:
-    """From now on its read() takes long in some modes, in all where none is named."""
+    """Makes the rig's read() slow in some modes, in all where none is named."""
     read = probe.read
 
     def slowly() -> Iterable[float]:
@@ -62,14 +62,14 @@ def routed(scene: Scene) -> None:
 
 
 def ramp(probe: Probe) -> tuple[list[int], list[float]]:
-    """When a rig was told something on its ramp to rest (ns), and the displacements (m)."""
+    """The times (ns) and the displacements (m) of a rig's commands during its ramp to rest."""
     log = probe.log
     steps = [place for place, mode in enumerate(log.modes) if mode is Mode.RAMPING]
     return [log.times[place] for place in steps], [log.commands[place][0] for place in steps]
 
 
 @pytest.mark.parametrize("befall", [own_slow_rig, trip_of_the_master, silence_of_the_slave, end_of_the_test])
-def test_no_row_of_a_slave_is_lost_that_comes_to_rest_long_after_the_master(
+def test_no_recorded_row_is_lost_of_a_slave_that_comes_to_rest_long_after_the_master(
     tmp_path: Path, befall: Callable[[Scene], None]
 ) -> None:
     scene = Scene(tmp_path, DURATION)

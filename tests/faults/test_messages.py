@@ -14,7 +14,7 @@ from validation.faults.wire import Conditions
 
 
 def kept(course: Course, first: int, count: int) -> float:
-    """How far the table moves over ticks whose commands are lost, m: it keeps the one before."""
+    """The table's motion over ticks whose commands are lost, m; it keeps the last command."""
     return course.motion(SLAVE, first - 1, count)
 
 

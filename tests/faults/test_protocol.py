@@ -30,7 +30,7 @@ from validation.faults.hostile import blank
         ({"protocol": PROTOCOL_VERSION + 1, "plan": "0123456789abcdef"}, "speaks protocol"),
     ],
 )
-def test_f34_another_version_or_plan(tmp_path: Path, changes: dict[str, Any], part: str) -> None:
+def test_f34_another_protocol_version_or_plan(tmp_path: Path, changes: dict[str, Any], part: str) -> None:
     scene = Scene(tmp_path, recorded=False)
     scene.change(
         SLAVE,
@@ -56,7 +56,7 @@ def test_f34_another_version_or_plan(tmp_path: Path, changes: dict[str, Any], pa
     )
 
 
-def test_f35_start_twice_stop_lost_stop_too_early(tmp_path: Path, undisturbed: Course) -> None:
+def test_f35_a_repeated_start_a_lost_stop_and_an_early_stop(tmp_path: Path, undisturbed: Course) -> None:
     scene = Scene(tmp_path)
     early = messages.Stop(1, 0, "too early.")
     route = scene.route(SLAVE, CONTROL)
@@ -105,7 +105,7 @@ def letter_of(scene: Scene, message: Message) -> Any:
 
 
 def starts_again(scene: Scene) -> None:
-    """The master's own start once more."""
+    """Replays the master's own start message."""
     route = scene.route(SLAVE, CONTROL)
     route.put([one._replace(origin="replayed") for one in route.history if one.kind == "Start"])
 
@@ -161,7 +161,7 @@ def master_in(state: State) -> MasterMachine:
 
 
 def finish(machine: SlaveMachine | MasterMachine, state: State, stop: Message | None, other: str) -> None:
-    """On to one of the ends."""
+    """Brings a laboratory to one of the final states."""
     loop = machine.loop
     if state in (State.STOPPING, State.DONE):
         if stop is not None:

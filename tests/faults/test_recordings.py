@@ -73,7 +73,7 @@ def test_f48_power_is_cut(unfinished: Path, tmp_path: Path) -> None:
     )
 
 
-def test_f49_bits_rot(unfinished: Path, tmp_path: Path) -> None:
+def test_f49_flipped_bits_in_a_recording(unfinished: Path, tmp_path: Path) -> None:
     places = chunks(unfinished)
     data = bytearray(unfinished.read_bytes())
     begin, end = places[len(places) // 2]

@@ -15,7 +15,7 @@ ARMING = 3 * SILENCE_NS
 TICKS = 50
 
 
-def test_a_rig_may_arm_for_longer_than_a_running_test_may_be_silent(
+def test_a_rig_may_take_longer_to_arm_than_the_recorder_waits_during_a_test(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = Scene(tmp_path, TICKS * 0.002)

@@ -94,7 +94,7 @@ def test_f26_replay_within_the_session(tmp_path: Path, undisturbed: Course) -> N
 
 
 @pytest.mark.slow
-def test_f27_a_jump_of_the_numbers(tmp_path: Path) -> None:
+def test_f27_a_jump_of_the_sequence_numbers(tmp_path: Path) -> None:
     scene = Scene(tmp_path, 6.0)
     key = codec.session_key(SESSION, scene.plan.digest())
     ahead = [hostile.letter(hostile.command(SESSION, AT + 1000 + k, 0.01), key, INSIDER) for k in range(50)]
@@ -127,7 +127,7 @@ def test_f27_a_jump_of_the_numbers(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_f28_stamps_in_the_future_and_clocks_apart(tmp_path: Path, undisturbed: Course) -> None:
+def test_f28_time_stamps_in_the_future_and_clock_offsets(tmp_path: Path, undisturbed: Course) -> None:
     second = 10**9
     for step in (second, -second):
         surrounding = Surrounding(seed=1, drifts={SLAVE: Drift(offset=5 * second + step)})
@@ -174,7 +174,7 @@ def test_f28_stamps_in_the_future_and_clocks_apart(tmp_path: Path, undisturbed: 
 
 
 @pytest.mark.slow
-def test_f29_clocks_drift_apart(tmp_path: Path) -> None:
+def test_f29_clocks_that_drift_apart(tmp_path: Path) -> None:
     drifts = {SLAVE: Drift(offset=10**9, ppb=200_000)}
     course = Scene(tmp_path, 20.0, surrounding=Surrounding(seed=1, drifts=drifts)).play()
     course.calm()
@@ -195,7 +195,7 @@ def test_f29_clocks_drift_apart(tmp_path: Path) -> None:
     )
 
 
-def test_f30_values_that_are_no_numbers(tmp_path: Path) -> None:
+def test_f30_values_that_are_not_finite(tmp_path: Path) -> None:
     scene = Scene(tmp_path)
     odd = {AT - 200: math.nan, AT - 150: math.inf, AT - 100: -math.inf}
     tiny = {AT - 50: -0.0, AT - 49: 5e-324}
@@ -294,7 +294,7 @@ def test_f33_hostile_contents(tmp_path: Path, undisturbed: Course) -> None:
     )
 
 
-def test_f53_a_wrong_check_under_a_right_content(tmp_path: Path, undisturbed: Course) -> None:
+def test_f53_correct_contents_with_a_wrong_checksum(tmp_path: Path, undisturbed: Course) -> None:
     plan = undisturbed.plan
     keys = [codec.session_key(SESSION, plan.digest()[::-1] + "x"), codec.session_key(0, "")]
     forged: dict[str, list[Letter]] = {SLAVE: [], MASTER: []}

@@ -1,4 +1,4 @@
-"""A frame of OpenSees alone, with a spring for the laboratory: `python alone.py FRAME METHOD`.
+"""An OpenSees frame without this program, with a spring as the specimen: `python alone.py FRAME METHOD`.
 
 It reads a task from standard input and prints the displacements of the floors, (steps, floors) m. METHOD is AlphaOS, or
 Newton for Newmark's trapezoidal rule with iterations.

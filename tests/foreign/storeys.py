@@ -1,4 +1,4 @@
-"""A linear building of two storeys by the explicit Newmark method, in the place of another program."""
+"""A linear building of two storeys by the explicit Newmark method, which stands in for another program."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An FMU as the building of the master, built here, beside the master's own linear building."""
+"""An FMU that is built here is the master's building and is compared with the master's own linear building."""
 
 from __future__ import annotations
 
@@ -93,7 +93,9 @@ def played(text: str, folder: Path, path: Path) -> Run:
     return read(path)
 
 
-def test_the_loop_with_an_fmu_is_that_with_the_masters_own_building(folder: Path, tmp_path: Path) -> None:
+def test_the_loop_with_an_fmu_equals_the_loop_with_the_masters_own_building(
+    folder: Path, tmp_path: Path
+) -> None:
     own = played(PLAN.replace("MODEL", ""), folder, tmp_path / "own.mcap").columns["master"]
     found = played(FOREIGN, folder, tmp_path / "found.mcap").columns["master"]
     for name in ("displacement", "column_target", "column_force"):
@@ -103,7 +105,7 @@ def test_the_loop_with_an_fmu_is_that_with_the_masters_own_building(folder: Path
     assert found["acceleration"][1:] == pytest.approx(own["acceleration"][:-1], abs=1e-9)
 
 
-def test_without_velocities_their_differences_are_taken(folder: Path, tmp_path: Path) -> None:
+def test_an_fmu_without_velocities_gets_them_from_differences(folder: Path, tmp_path: Path) -> None:
     options = 'options = { outputs = ["displacement_1"] }\nmass'
     own = played(FOREIGN, folder, tmp_path / "own.mcap").columns["master"]
     found = played(FOREIGN.replace("mass", options), folder, tmp_path / "a.mcap").columns["master"]
@@ -127,7 +129,7 @@ def test_options_that_do_not_fit_are_refused(options: dict[str, Any], says: str,
     assert says in str(told.value)
 
 
-def test_an_fmu_that_fails_ends_the_test_with_its_sentence(folder: Path, tmp_path: Path) -> None:
+def test_an_fmu_that_fails_ends_the_test_with_its_own_message(folder: Path, tmp_path: Path) -> None:
     plan = parse(FOREIGN + "[ground_motion]\nscale = 2.0\n", folder)
     error = virtual.run(virtual.assemble(plan, as_planned(plan), tmp_path / "a.mcap"), str)
     assert error is not None

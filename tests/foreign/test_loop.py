@@ -1,4 +1,4 @@
-"""The loop with a building that another program computes, beside the loop with the master's own."""
+"""The loop with a building that another program computes, compared with the loop with the master's own."""
 
 from __future__ import annotations
 
@@ -57,7 +57,9 @@ def model_of(plan: Plan, late: tuple[int, ...] = ()) -> Storeys:
 
 
 @pytest.mark.parametrize("text", [BELOW, UPSTAIRS], ids=["below", "upstairs"])
-def test_the_loop_is_that_with_the_masters_own_building(text: str, tmp_path: Path) -> None:
+def test_the_loop_with_another_program_equals_the_loop_with_the_masters_own_building(
+    text: str, tmp_path: Path
+) -> None:
     """With ideal transfer systems; of others the rates of the target are differences of it, and nearly the same."""
     plan = ideal(parse(text, tmp_path))
     assert partition.storey_stiffnesses(plan).tolist() == pytest.approx(STIFFNESS)
@@ -90,7 +92,7 @@ class Ticking(Pace):
         """The watchdog counts."""
 
 
-def test_a_late_step_holds_all_commands_and_the_buildings_time_stands_still(tmp_path: Path) -> None:
+def test_a_late_step_holds_all_commands_and_pauses_the_buildings_time(tmp_path: Path) -> None:
     plan = parse(BELOW, tmp_path)
     late = (300, 301, 700)
     run = played(plan, tmp_path / "late.mcap", model_of(plan, late), Ticking())
@@ -105,7 +107,7 @@ def test_a_late_step_holds_all_commands_and_the_buildings_time_stands_still(tmp_
     assert event["values"]["steps"] == plan.ticks - 3
 
 
-def test_a_building_that_is_silent_brings_the_laboratories_to_rest(tmp_path: Path) -> None:
+def test_a_building_program_that_falls_silent_brings_the_laboratories_to_rest(tmp_path: Path) -> None:
     plan = parse(BELOW + "[safety]\nhold_after = 3\nramp_after = 5\n", tmp_path)
     model = model_of(plan, (200,) * 50)
     rows = substructure.ground_rows(plan, substructure.motion(plan))
@@ -127,7 +129,7 @@ class Silent(Storeys):
         """None, however long it is waited for."""
 
 
-def test_a_program_that_does_not_answer_ends_a_test_in_virtual_time(tmp_path: Path) -> None:
+def test_a_building_program_that_never_answers_ends_a_test_in_virtual_time(tmp_path: Path) -> None:
     plan = parse(BELOW, tmp_path)
     rows = substructure.ground_rows(plan, substructure.motion(plan))
     model = Silent(rows[0], plan.test.interval)
@@ -154,7 +156,7 @@ def test_a_plan_that_does_not_fit_its_model_is_refused(change: tuple[str, str], 
         parse(FOREIGN.replace(*change), Path())
 
 
-def test_a_plan_without_a_model_keeps_its_digest_and_one_with_a_model_goes_through_toml() -> None:
+def test_a_plan_without_a_model_keeps_its_digest_and_one_with_a_model_is_written_and_read() -> None:
     assert {"model", "options", "intervals"}.isdisjoint(Plan().tables()["structure"])
     plan = parse(FOREIGN.replace("mass =", "options = { bars = 3 }\nmass ="), Path())
     again = parse(plan.toml(), Path())
@@ -163,7 +165,7 @@ def test_a_plan_without_a_model_keeps_its_digest_and_one_with_a_model_goes_throu
     assert again.digest() == plan.digest() != parse(FOREIGN, Path()).digest()
 
 
-def test_a_reality_gives_options_of_the_model_and_nothing_else_of_the_building() -> None:
+def test_a_reality_may_change_only_the_options_of_a_building_model() -> None:
     plan = parse(FOREIGN, Path())
     truth = from_reality({"structure": {"options": {"bars": 2}}}, plan, Path())
     assert truth.plan.structure.options == {"bars": 2}
@@ -172,7 +174,7 @@ def test_a_reality_gives_options_of_the_model_and_nothing_else_of_the_building()
 
 
 @pytest.mark.parametrize("verb", ["simulate", "check", "run"])
-def test_a_command_that_cannot_compute_the_building_says_so(
+def test_a_command_that_cannot_compute_the_building_is_refused_with_the_reason(
     verb: str, tmp_path: Path, call: Callable[..., int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "plan.toml").write_text(FOREIGN)
@@ -184,7 +186,7 @@ def test_a_command_that_cannot_compute_the_building_says_so(
     assert said.endswith(".")
 
 
-def test_the_interval_that_can_be_held_is_judged_in_real_time_only() -> None:
+def test_the_step_times_of_a_model_are_judged_in_real_time_only() -> None:
     plan = parse(FOREIGN, Path())  # 2 ms, of which a tick waits 75 %
     ranked = [1e-3] * 98 + [1.4e-3, 9e-3]
     good = foreign.judged(plan, "frame.py", ranked, paced=True)
@@ -199,7 +201,7 @@ def test_the_interval_that_can_be_held_is_judged_in_real_time_only() -> None:
     assert foreign.judged(plan, "frame.py", [1.0], paced=False).risk is None
 
 
-def test_a_program_that_ends_is_an_interlock(tmp_path: Path) -> None:
+def test_a_building_program_that_ends_is_an_interlock(tmp_path: Path) -> None:
     plan = parse(BELOW, tmp_path)
     model = model_of(plan)
 

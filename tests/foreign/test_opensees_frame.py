@@ -105,7 +105,7 @@ def plan_of(more: str = "", ticks: int = 700) -> Plan:
     )
 
 
-def test_the_frame_in_the_loop_is_the_frame_with_the_specimen_inside(tmp_path: Path) -> None:
+def test_the_hybrid_frame_equals_the_frame_with_the_specimen_inside_opensees(tmp_path: Path) -> None:
     """With an ideal transfer system to rounding; with default actuator, compensator and noise within 1 % of the drift.
 
     So is it of OpenSees with Newton's iterations in every step.
@@ -119,7 +119,7 @@ def test_the_frame_in_the_loop_is_the_frame_with_the_specimen_inside(tmp_path: P
     assert found == pytest.approx(drift(alone(plan, [["Elastic", STIFFNESS]], "Newton")), rel=0.01)
 
 
-def test_a_specimen_that_yields_in_the_loop_is_the_one_inside(tmp_path: Path) -> None:
+def test_a_yielding_specimen_in_the_loop_equals_one_inside_opensees(tmp_path: Path) -> None:
     yields = '[column]\nmodel = "bilinear"\nyield_displacement = 1e-3\nhardening = 0.1\n'
     plan = plan_of(IDEAL + yields)
     expected = alone(plan, [["Steel01", 12.5e3, STIFFNESS, 0.1]])
@@ -165,7 +165,7 @@ def moved(models: list[ForeignModel]) -> list[list[float]]:
     return found
 
 
-def test_two_models_at_once_have_a_process_each(tmp_path: Path) -> None:
+def test_two_models_at_once_run_in_separate_processes(tmp_path: Path) -> None:
     plan = rod(tmp_path)
     soft, stiff = moved([started(plan), started(plan, stiffness=4e7)])
     assert [soft] == moved([started(plan)])
@@ -183,7 +183,9 @@ def test_two_models_at_once_have_a_process_each(tmp_path: Path) -> None:
         (ROD.replace("floors=1", "floors=2"), "has 2 floors, but [structure] gives 1 masses"),
     ],
 )
-def test_a_model_that_cannot_be_the_building_is_said(text: str, says: str, tmp_path: Path) -> None:
+def test_a_model_that_cannot_be_the_building_is_refused_with_the_reason(
+    text: str, says: str, tmp_path: Path
+) -> None:
     plan = rod(tmp_path, text)
     with pytest.raises(InputError) as told:
         foreign.checked(plan)
@@ -191,7 +193,9 @@ def test_a_model_that_cannot_be_the_building_is_said(text: str, says: str, tmp_p
     assert str(told.value).startswith("'rod.py' ")
 
 
-def test_a_model_that_dies_leaves_the_laboratories_safe_and_the_recording_whole(tmp_path: Path) -> None:
+def test_after_a_models_process_dies_the_laboratories_are_safe_and_the_recording_is_complete(
+    tmp_path: Path,
+) -> None:
     plan = rod(tmp_path)
     bench = virtual.assemble(plan, as_planned(plan), tmp_path / "a.mcap")
     virtual.play(bench, pause=lambda: bench.master.ticks >= 100)
@@ -207,14 +211,14 @@ def test_a_model_that_dies_leaves_the_laboratories_safe_and_the_recording_whole(
     assert int(run.ramps["master"]["seq"][0]) == 100  # in the tick itself
 
 
-def test_a_model_without_equilibrium_ends_the_test_with_its_time(tmp_path: Path) -> None:
+def test_a_model_that_finds_no_equilibrium_ends_the_test_with_the_time(tmp_path: Path) -> None:
     text = ROD.replace("    return", "    ops.analyze = lambda steps, h: -3\n    return")
     plan = rod(tmp_path, text)
     error = virtual.run(virtual.assemble(plan, as_planned(plan), tmp_path / "a.mcap"), str)
     assert str(error) == "The building 'rod.py' has ended: OpenSees finds no equilibrium at 0.002 s."
 
 
-def test_check_times_the_steps_and_lists_the_file_that_it_runs(
+def test_check_measures_the_step_times_and_lists_the_model_file(
     tmp_path: Path, call: Callable[..., int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     rod(tmp_path)
@@ -227,7 +231,7 @@ def test_check_times_the_steps_and_lists_the_file_that_it_runs(
     assert found.startswith("A step of the building 'rod.py' takes ")
 
 
-def test_a_diagnosis_judges_the_laboratories_and_says_that_the_building_is_not_judged(
+def test_a_diagnosis_judges_the_laboratories_and_states_that_the_building_is_not_judged(
     tmp_path: Path, call: Callable[..., int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     rod(tmp_path)

@@ -1,4 +1,4 @@
-"""A user's class that is no complete kind of laboratory gets one sentence that says what is wrong, and where."""
+"""A user's class that is not a complete kind of laboratory is refused in one sentence that says what is wrong."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def written(
 def complaint(
     folder: Path, attributes: dict[str, str] | None = None, step: str = STEP, base: str = "Device"
 ) -> str:
-    """What is said of such a class."""
+    """The sentence in which such a class is refused."""
     with pytest.raises(InputError) as caught:
         written(folder, attributes, step, base)
     (sentence,) = str(caught.value).splitlines()
@@ -54,7 +54,7 @@ def complaint(
     return sentence
 
 
-def test_a_complete_class_is_a_kind(tmp_path: Path) -> None:
+def test_a_complete_class_is_accepted_as_a_kind(tmp_path: Path) -> None:
     kind = written(tmp_path, {"rms": '{"push": 1.0}'})
     assert kind.name == "spring"
     assert [(one.channels, one.moved) for one in kind.sensed] == [(("push",), "place")]
@@ -107,7 +107,7 @@ def test_an_attribute_that_is_missing_or_wrong_is_named(
     assert sentence.startswith(f"Spring ({tmp_path / 'own.py'}) named in [slave] kind {said}")
 
 
-def test_no_channel_and_seven_are_refused(tmp_path: Path) -> None:
+def test_a_class_without_channels_and_one_with_seven_are_refused(tmp_path: Path) -> None:
     more = ", ".join(f'Signal("place{number}", "m", "")' for number in range(7))
     begin, end = CHANNELS.split("measured=(")
     rest = end[end.index("),\n        position") :]
@@ -118,7 +118,7 @@ def test_no_channel_and_seven_are_refused(tmp_path: Path) -> None:
     assert "measures 0 channels" in complaint(tmp_path / "none", {"channels": f"{begin}measured=({rest}"})
 
 
-def test_a_class_that_is_no_device_and_a_class_without_a_step(tmp_path: Path) -> None:
+def test_a_class_that_is_not_a_device_or_has_no_step_is_refused(tmp_path: Path) -> None:
     assert complaint(tmp_path, base="object") == (
         "Spring named in [slave] kind is no kind of laboratory: derive it from laboratories.device.Device."
     )
@@ -147,7 +147,7 @@ def test_a_step_that_does_not_compile_is_named_with_file_and_line(
         assert sentence.startswith(f"{begin}{number}: {line}): ")
 
 
-def test_a_step_with_other_arguments_is_no_kernel(tmp_path: Path) -> None:
+def test_a_step_with_other_arguments_is_refused(tmp_path: Path) -> None:
     assert "5 argument types given, but function takes 3 arguments" in complaint(
         tmp_path,
         step="\n    @staticmethod\n    def step(state, truth, command):\n        truth[0] = command\n",
@@ -163,7 +163,7 @@ def test_a_step_with_other_arguments_is_no_kernel(tmp_path: Path) -> None:
         ("truth[1] = parameters[2]", "sets push (truth[1]) to no finite number along a sine of 1 mm"),
     ],
 )
-def test_a_step_that_writes_or_reads_beside_its_arrays_is_found_before_it_runs(
+def test_a_step_that_accesses_memory_outside_its_arrays_is_refused_before_it_runs(
     tmp_path: Path, line: str, said: str
 ) -> None:
     sentence = complaint(tmp_path, step=STEP + f"        {line}\n")
@@ -198,7 +198,7 @@ def test_a_channel_that_step_leaves_out_is_named(tmp_path: Path) -> None:
         ("[device.noise]\npiston_target = 1.0", "Unknown key 'piston_target' in [device.noise]"),
     ],
 )
-def test_what_a_plan_gives_a_device_is_checked_by_its_class(table: str, said: str) -> None:
+def test_parameters_that_a_plan_gives_a_device_are_checked_by_its_class(table: str, said: str) -> None:
     plan = plans.parse(f'[slave]\nkind = "viscous_damper.py:ViscousDamper"\n{table}\n', ROOT / "examples")
     kind = kind_of(plan, "slave")
     with pytest.raises((InputError, PlanError)) as caught:
@@ -206,7 +206,7 @@ def test_what_a_plan_gives_a_device_is_checked_by_its_class(table: str, said: st
     assert said in str(caught.value)
 
 
-def test_what_a_plan_gives_takes_the_place_of_what_the_class_gives() -> None:
+def test_parameters_of_the_plan_override_those_of_the_class() -> None:
     text = '[slave]\nkind = "viscous_damper.py:ViscousDamper"\n[device.parameters]\nstiffness = "30 kN/mm"\n'
     text += '[device.limits]\npiston_force = "100 kN"\n[device.noise]\npiston_force = 0.0\n'
     plan = plans.parse(text, ROOT / "examples")

@@ -1,4 +1,4 @@
-"""The emulated laboratories against solutions of their differential equations by other means."""
+"""The emulated laboratories against independent solutions of their differential equations."""
 
 from __future__ import annotations
 
@@ -44,7 +44,9 @@ def delayed_ramp(values: Array, lag: float) -> Any:
 
 @settings(max_examples=30, deadline=None)
 @given(lag=st.floats(0.0, 0.02), share=st.floats(0.0, 1.0), substeps=st.integers(1, 8))
-def test_the_delayed_command_is_the_ramp_delayed(lag: float, share: float, substeps: int) -> None:
+def test_the_delayed_command_equals_the_ramp_at_an_earlier_time(
+    lag: float, share: float, substeps: int
+) -> None:
     values = commands(60)
     segments = delay.split(DT, lag, substeps)
     history = np.zeros(segments.memory)
@@ -60,7 +62,7 @@ def test_the_delayed_command_is_the_ramp_delayed(lag: float, share: float, subst
 
 @settings(max_examples=30, deadline=None)
 @given(lag=st.floats(0.0, 0.02), substeps=st.integers(1, 8))
-def test_a_held_command_is_delayed_as_steps(lag: float, substeps: int) -> None:
+def test_a_held_command_is_delayed_in_steps(lag: float, substeps: int) -> None:
     values = commands(60)
     segments = delay.split(DT, lag, substeps, held=True)
     history = np.zeros(segments.memory)
@@ -76,7 +78,7 @@ def test_a_held_command_is_delayed_as_steps(lag: float, substeps: int) -> None:
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.014, 0.0133])
-def test_a_held_command_acts_as_steps_on_the_lag(lag: float) -> None:
+def test_a_held_command_acts_on_the_lag_in_steps(lag: float) -> None:
     values, constant = commands(200), 0.010
     lab = column_lab.build(
         DT, Actuator(gain=0.98, delay=lag, time_constant=constant, command="held"), Column()
@@ -113,7 +115,7 @@ def test_the_actuator_solves_its_equation(lag: float, time_constant: float) -> N
     assert np.array_equal(got[:, 1], 1e7 * got[:, 0])
 
 
-def test_the_actuators_step_response_is_the_closed_form() -> None:
+def test_the_actuators_step_response_agrees_with_the_closed_form() -> None:
     lab = column_lab.build(DT, Actuator(gain=1.0, delay=0.014, time_constant=0.030), Column())
     for _ in range(200):
         displacement, _ = column_lab.advance(lab, 1.0)
@@ -173,7 +175,7 @@ def test_table_and_damper_solve_their_equations(lag: float, motor: float) -> Non
     assert np.all(np.max(np.abs(got - exact), axis=0) < 2e-6 * scale)
 
 
-def test_an_ideal_table_follows_at_once_and_carries_the_damper_along() -> None:
+def test_an_ideal_table_follows_at_once_and_moves_the_damper() -> None:
     table, damper = ShakingTable(frequency=math.inf, delay=0.0), Damper(stiffness=0.0, damping=0.0)
     wanted = commands(500)
     lab = table_lab.build(DT, table, damper)
@@ -195,7 +197,7 @@ def test_the_dampers_force_balances_its_motion() -> None:
     assert np.sqrt(np.mean(error**2)) < 0.02 * np.sqrt(np.mean(got[:, 3] ** 2))
 
 
-def test_noise_is_the_same_one_by_one_and_at_once() -> None:
+def test_noise_drawn_tick_by_tick_equals_noise_drawn_at_once() -> None:
     levels = TABLE.noise(Plan())
     single, whole = noise.Noise(3, levels), noise.Noise(3, levels)
     rows = whole.rows(2500)

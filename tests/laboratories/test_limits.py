@@ -1,4 +1,4 @@
-"""Limits by themselves: values, rates against what was written, errors that last, frozen sensors, NaN and inf."""
+"""Limits on values, on rates of written commands, on lasting errors, on frozen sensors, and on NaN and inf."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Actuator:
 # -- values ---------------------------------------------------------------------------------------
 
 
-def test_limits_apply_by_name_and_take_no_nan() -> None:
+def test_limits_apply_by_name_and_refuse_nan() -> None:
     limits = limited(vars(Limits(column_force=10.0)), COLUMN.channels.names)
     assert first_beyond(limits, (0.0, 10.0)) is None
     assert str(first_beyond(limits, (0.0, -10.1))) == "column_force is -10.1, beyond its limit of 10 N."
@@ -64,7 +64,7 @@ def test_a_tick_names_the_first_value_beyond_its_limit() -> None:
     assert (found.name, math.isnan(found.value)) == ("column_force", True)
 
 
-def test_a_master_without_a_laboratory_has_the_limits_of_its_values_alone() -> None:
+def test_a_master_without_a_laboratory_has_only_the_limits_on_its_values() -> None:
     limits = TickLimits(None, Plan(), [Limit("velocity", 1.0), Limit("none", NONE)], commands=0)
     assert limits.violation(0.0, 1.0, math.nan) is None
     limits.written(())
@@ -75,7 +75,7 @@ def test_a_master_without_a_laboratory_has_the_limits_of_its_values_alone() -> N
 # -- changes and lasting errors -------------------------------------------------------------------
 
 
-def test_the_first_command_is_a_change_from_rest_in_zero() -> None:
+def test_the_first_commands_rate_is_measured_from_rest_at_zero() -> None:
     assert Actuator(actuator_step=1e-3).violation(1e-3) is None
     assert Actuator(actuator_step=1e-3).violation(-1.01e-3) == LimitViolation(
         "actuator_step", -1.01e-3, 1e-3, "m"
@@ -90,7 +90,7 @@ def test_the_first_command_is_a_change_from_rest_in_zero() -> None:
         assert found.value == pytest.approx(value)
 
 
-def test_rates_are_those_of_what_was_written() -> None:
+def test_rates_are_measured_between_written_commands() -> None:
     change = Actuator(actuator_step=1e-3, actuator_acceleration=400.0)
     change.written(1e-3)
     assert change.violation(2.0e-3) is None
@@ -114,14 +114,14 @@ def test_an_acceleration_is_the_second_difference() -> None:
     assert found.value == pytest.approx((4e-4 - 2 * 6e-4 + 3e-4) / INTERVAL**2)
 
 
-def test_the_force_of_a_motor_has_a_limit_on_its_step_alone() -> None:
+def test_a_motors_force_is_limited_in_its_step_only() -> None:
     motor = tick_limits(TABLE, replace(Plan(), limits=Limits(damper_step=10.0)))
     at_rest = (0.0,) * len(TABLE.channels.names)
     assert motor.violation(0.0, *at_rest, 0.0, 10.0) is None
     assert motor.violation(0.0, *at_rest, 0.0, 10.1) == LimitViolation("damper_step", 10.1, 10.0, "N")
 
 
-def test_an_error_trips_when_it_lasts() -> None:
+def test_a_tracking_error_trips_when_it_lasts() -> None:
     column = Actuator(column_error=0.01)
     errors = [0.011, -0.02, 0.01, 0.011, -0.011, 0.012, 0.013]
     found = [column.violation(0.0, error) for error in errors]
@@ -129,7 +129,7 @@ def test_an_error_trips_when_it_lasts() -> None:
     assert found[5] == LimitViolation("column_error", 0.012, 0.01, "m")
 
 
-def test_nan_is_beyond_any_limit_and_nothing_else_beyond_an_infinite_one() -> None:
+def test_nan_exceeds_any_limit_and_only_nan_exceeds_an_infinite_one() -> None:
     column = Actuator(column_error=math.inf, actuator_command=math.inf)
     assert column.violation(1e300) is None
     assert all(column.violation(0.0, 1e9) is None for _ in range(2 * PATIENCE))
@@ -146,7 +146,7 @@ COUNT = Plan().safety.frozen_readings
 def watched(
     displacements: object, plan: Plan | None = None, *, speed: float = NOISE
 ) -> tuple[int, Standstill | None]:
-    """How many ticks it took, and what was found, with a command that moves by `speed` in every tick."""
+    """The number of ticks read and the violation found, with a command that moves by `speed` in every tick."""
     chosen = replace(plan or Plan(), limits=Limits(column_error=math.inf))
     limits = tick_limits(COLUMN, chosen)
     forces = np.random.default_rng(2).normal(0.0, 100.0, 10_000)
@@ -173,14 +173,14 @@ def test_a_sensor_that_freezes_is_found_after_so_many_equal_readings() -> None:
     assert tick == 60 + 6
 
 
-def test_a_sensor_that_goes_on_again_in_time_is_none() -> None:
+def test_a_sensor_that_resumes_in_time_does_not_count_as_frozen() -> None:
     values = noisy(200)
     for first in (30, 60, 120):
         values[first : first + COUNT - 1] = values[first]
     assert watched(values) == (200, None)
 
 
-def test_nothing_is_judged_while_the_command_rests() -> None:
+def test_a_sensor_is_not_checked_for_freezing_while_the_command_rests() -> None:
     values = noisy(300)
     values[60:] = values[60]
     assert watched(values, speed=0.0) == (300, None)
@@ -189,14 +189,14 @@ def test_nothing_is_judged_while_the_command_rests() -> None:
     assert tick == pytest.approx(60 + 10 * TRAVEL, abs=2)
 
 
-def test_a_sensor_without_nominal_noise_may_repeat_itself() -> None:
+def test_a_sensor_without_nominal_noise_may_repeat_readings() -> None:
     values = noisy(300)
     values[60:] = values[60]
     assert watched(values, with_table(Plan(), "sensors", column_displacement=0.0)) == (300, None)
 
 
 @pytest.mark.parametrize("step", [2.0, 10.0, 100.0])
-def test_a_sensor_with_steps_above_its_noise_may_repeat_itself(step: float) -> None:
+def test_a_sensor_with_rounding_above_its_noise_may_repeat_readings(step: float) -> None:
     moving = noisy(5000) + 0.002 * np.sin(0.001 * np.arange(5000))
     quantum = step * NOISE
     values = quantum * np.floor(moving / quantum + 0.5)
@@ -205,7 +205,7 @@ def test_a_sensor_with_steps_above_its_noise_may_repeat_itself(step: float) -> N
 
 
 @pytest.mark.parametrize("step", [0.1, 0.5, 0.9])
-def test_a_sensor_with_steps_below_its_noise_does_not_and_is_judged(step: float) -> None:
+def test_a_sensor_with_rounding_below_its_noise_is_checked_for_freezing(step: float) -> None:
     quantum = step * NOISE
     values = quantum * np.floor(noisy(8000) / quantum + 0.5)
     assert watched(values) == (8000, None)
@@ -213,5 +213,5 @@ def test_a_sensor_with_steps_below_its_noise_does_not_and_is_judged(step: float)
     assert watched(values)[1] is not None
 
 
-def test_a_rig_that_always_gives_the_same_has_no_noise_that_could_be_missed() -> None:
+def test_a_rig_whose_readings_never_change_is_not_taken_for_frozen() -> None:
     assert watched(np.zeros(500)) == (500, None)

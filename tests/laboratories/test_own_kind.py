@@ -1,4 +1,4 @@
-"""The example of a user's own kind: a viscous damper under an actuator, beside closed forms."""
+"""The example of a user's kind, a viscous damper under an actuator, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def moved(
     faults: dict[str, float] | None = None,
     **given: float,
 ) -> Array:
-    """What the kernel reads, without compilation, along a command over time; (ticks, 2)."""
+    """The readings of the kernel, without compilation, under a command over time; (ticks, 2)."""
     values = (NOMINAL | given).values()
     row = np.array([INTERVAL, *values, *({"leak": 0.0, "air": 0.0} | (faults or {})).values()])
     state, truth = np.zeros(kind.states), np.zeros(2)
@@ -68,7 +68,7 @@ def amplitude(signal: Array, frequency: float) -> complex:
     return complex(2j * np.mean(signal[-ticks:] * np.exp(-2j * math.pi * frequency * t)))
 
 
-def test_the_class_stands_in_at_most_120_lines() -> None:
+def test_the_example_of_a_users_kind_has_at_most_120_lines() -> None:
     assert len(FILE.read_text(encoding="utf-8").splitlines()) <= 120
 
 
@@ -93,7 +93,7 @@ def test_a_linear_damper_has_the_storage_and_loss_stiffness_of_a_maxwell_element
 
 
 @pytest.mark.parametrize("frequency", [1.0, 5.0])
-def test_the_actuator_is_a_lag_with_dead_time(damper: Device, frequency: float) -> None:
+def test_the_examples_actuator_is_a_lag_with_dead_time(damper: Device, frequency: float) -> None:
     omega = 2.0 * math.pi * frequency
     read = moved(
         damper, lambda t: 5e-3 * math.sin(omega * t), round(4.0 / frequency / INTERVAL), delay=0.0071
@@ -108,12 +108,12 @@ def test_at_constant_speed_the_force_is_that_of_the_dashpot(damper: Device) -> N
         assert read[-1, 1] == pytest.approx(math.copysign(232.7e3 * abs(speed) ** 0.35, speed), rel=1e-6)
 
 
-def test_leaking_oil_lowers_the_force_of_the_dashpot(damper: Device) -> None:
+def test_an_oil_leak_lowers_the_force_of_the_dashpot(damper: Device) -> None:
     read = moved(damper, lambda t: 0.1 * t, 1000, {"leak": 0.3})
     assert read[-1, 1] == pytest.approx(0.7 * 232.7e3 * 0.1**0.35, rel=1e-6)
 
 
-def test_trapped_air_takes_its_width_without_a_force_each_way(damper: Device) -> None:
+def test_trapped_air_gives_a_zero_force_over_its_width_in_each_direction(damper: Device) -> None:
     read = moved(damper, lambda t: 0.05 * min(t, 1.0 - t), 500, {"air": 2e-3})
     piston, force = read.T
     assert np.all(force[: int(np.argmax(piston > 1e-3))] == 0.0)
@@ -123,7 +123,7 @@ def test_trapped_air_takes_its_width_without_a_force_each_way(damper: Device) ->
     assert piston[zero[0]] - piston[zero[-1]] == pytest.approx(2e-3, abs=0.25e-3)
 
 
-def test_compiled_it_gives_the_same(damper: Device, plan: Plan) -> None:
+def test_the_compiled_kernel_gives_the_same_readings(damper: Device, plan: Plan) -> None:
     lab = damper.build(System(plan))
     truth = np.zeros(2)
     driven(lab.step, lab.parameters, lab.state, truth, 5e-3, 250)
@@ -131,7 +131,7 @@ def test_compiled_it_gives_the_same(damper: Device, plan: Plan) -> None:
     assert truth == pytest.approx(read[-1], rel=1e-9)
 
 
-def test_its_faults_are_effects_that_reach_the_kernel(damper: Device, plan: Plan) -> None:
+def test_the_examples_effects_change_the_kernels_parameters(damper: Device, plan: Plan) -> None:
     effects: dict[str, Effect] = {effect.name: effect for effect in damper.effects}
     assert list(effects) == ["device.leak", "device.air"]
     system = effects["device.leak"].apply(System(plan), share=0.25)

@@ -33,7 +33,7 @@ WIDE = st.floats(-1e6, 1e6, allow_subnormal=False)
 
 
 def read(values: Array, effects: SensorEffects, noises: Array | None = None, interval: float = DT) -> Array:
-    """Readings at the ticks of the values there."""
+    """The readings of a channel that has these values at the ticks."""
     sensors = readings.build(interval, (NAME,), {NAME: effects})
     added = np.zeros(values.size) if noises is None else noises
     pairs = zip(values.tolist(), added.tolist(), strict=True)
@@ -41,7 +41,9 @@ def read(values: Array, effects: SensorEffects, noises: Array | None = None, int
 
 
 @given(st.lists(st.tuples(WIDE, WIDE), min_size=1, max_size=20))
-def test_without_effects_a_reading_is_value_plus_noise_to_the_bit(rows: list[tuple[float, float]]) -> None:
+def test_without_effects_a_reading_is_value_plus_noise_to_the_last_bit(
+    rows: list[tuple[float, float]],
+) -> None:
     values, noises = np.array(rows).T
     assert read(values, SensorEffects(), noises).tobytes() == (values + noises).tobytes()
 
@@ -52,7 +54,7 @@ def test_without_effects_a_reading_is_value_plus_noise_to_the_bit(rows: list[tup
     drift=st.floats(-1e4, 1e4),
     values=st.lists(WIDE, min_size=1, max_size=20),
 )
-def test_gain_bias_and_drift_are_a_straight_line(
+def test_gain_bias_and_drift_give_a_straight_line(
     gain: float, bias: float, drift: float, values: list[float]
 ) -> None:
     given_, noises = np.array(values), np.arange(len(values)) * 0.3
@@ -72,7 +74,7 @@ def test_the_steady_lag_behind_a_ramp_is_the_time_constant(tau: float) -> None:
 
 @given(tau=st.floats(1e-4, 0.5))
 @settings(max_examples=30)
-def test_the_response_to_a_ramped_step_is_the_closed_form(tau: float) -> None:
+def test_the_response_to_a_ramped_step_agrees_with_the_closed_form(tau: float) -> None:
     """The value ramps from 0 at tick 0 to 1 at tick 1 and stays."""
     got = read(np.concatenate([[0.0], np.ones(100)]), SensorEffects(lag=tau))
     t = DT * np.arange(1, 101)
@@ -81,7 +83,7 @@ def test_the_response_to_a_ramped_step_is_the_closed_form(tau: float) -> None:
     assert np.allclose(got[1:], (early - late) / DT, atol=1e-10)
 
 
-def test_the_lag_solves_its_equation_and_gain_and_bias_come_after_it() -> None:
+def test_a_sensors_lag_solves_its_equation_before_gain_and_bias_apply() -> None:
     t = DT * np.arange(200)
     values = np.sin(17.0 * t) + 0.2 * np.sin(90.0 * t)
     got = read(values, SensorEffects(gain=1.1, bias=0.3, lag=0.008))
@@ -99,7 +101,7 @@ def test_the_lag_solves_its_equation_and_gain_and_bias_come_after_it() -> None:
 
 @given(delay=st.floats(1e-5, 0.2), start=st.floats(-5.0, 5.0), interval=st.sampled_from([DT, 1.0 / 4096.0]))
 @settings(max_examples=60)
-def test_a_delayed_reading_is_the_straight_line_between_two_values_before(
+def test_a_delayed_reading_is_interpolated_linearly_between_earlier_values(
     delay: float, start: float, interval: float
 ) -> None:
     values = start + np.random.default_rng(8).normal(size=round(0.25 / interval))
@@ -110,7 +112,7 @@ def test_a_delayed_reading_is_the_straight_line_between_two_values_before(
     assert (got[t < delay - interval] == 0.0).all()
 
 
-def test_gain_bias_drift_and_noise_come_after_the_delay_and_the_lag_before() -> None:
+def test_gain_bias_drift_and_noise_apply_after_lag_and_delay() -> None:
     values, noises = np.sin(0.1 * np.arange(80.0)), np.cos(3.0 * np.arange(80.0))
     lagged = read(values, SensorEffects(lag=0.008))
     more = SensorEffects(gain=1.1, bias=0.3, drift=2.0, lag=0.008, delay=3 * DT)
@@ -143,7 +145,7 @@ def test_a_quantised_reading_lies_on_the_grid_within_half_a_step(step: float, va
     assert np.allclose(got / step, np.round(got / step), rtol=1e-12, atol=1e-9)
 
 
-def test_quantisation_errors_are_those_of_widrow() -> None:
+def test_quantisation_errors_agree_with_widrows_model() -> None:
     """Of a signal that moves over many steps they are uniform: rms step/√12, and no bias."""
     values = np.random.default_rng(4).normal(size=20_000) * 50.0
     error = read(values, SensorEffects(quantization=2.0)) - values
@@ -152,7 +154,7 @@ def test_quantisation_errors_are_those_of_widrow() -> None:
 
 
 @pytest.mark.parametrize("name", [*COLUMN.channels.names, *TABLE.channels.names])
-def test_levels_add_as_independent_noises_do(name: str) -> None:
+def test_noise_levels_add_as_independent_noises(name: str) -> None:
     kind = COLUMN if name in COLUMN.channels.names else TABLE
     names, nominal = kind.channels.names, kind.noise(Plan())
     found = readings.levels(names, nominal, {name: SensorEffects(noise=3.0)})
@@ -162,7 +164,7 @@ def test_levels_add_as_independent_noises_do(name: str) -> None:
     assert readings.levels(names, nominal, {}).tobytes() == nominal.tobytes()
 
 
-def test_the_noise_of_a_reading_has_the_level_of_both() -> None:
+def test_the_noise_of_a_reading_combines_the_nominal_level_and_the_effects() -> None:
     force = SensorEffects(noise=300.0)
     loud = Plan(sensors=SensorsTable(column_force=400.0))
     lab = EmulatedLab(COLUMN, System(loud, Effects(sensors={"column_force": force})), 3)
@@ -181,7 +183,7 @@ SIZES = {"gain": 1.1, "bias": 0.02, "drift": 0.01, "lag": 0.005, "delay": 0.0071
 
 @pytest.mark.parametrize("kind", SIZES)
 @pytest.mark.parametrize("name", [*COLUMN.channels.names, *TABLE.channels.names])
-def test_the_rigs_falsify_the_reading_named_and_the_truth_stays(name: str, kind: str) -> None:
+def test_a_falsified_reading_leaves_the_true_values_unchanged(name: str, kind: str) -> None:
     """From one laboratory's readings without the effect, those with it by the formula."""
     effect = CATALOGUE[f"sensor.{name}.{kind}"]
     size = SIZES[kind] * (1.0 if kind in ("gain", "lag", "delay") else min(effect.parameters[0].most, 1.0))
@@ -216,7 +218,7 @@ def loop(system: System) -> Rollout:
 
 
 def test_the_loop_acts_on_the_falsified_force(default_plan: Plan) -> None:
-    """A load cell off by a factor and a specimen off by it are one to a linear, unloaded laboratory."""
+    """In a linear laboratory a load cell with a gain acts like a specimen with that factor on its stiffness."""
     plan = with_test(default_plan, duration=3.0)
     cell = loop(lay(System(plan), [("sensor.column_force.gain", {"factor": 1.07})]))
     column = loop(lay(System(plan), [("column.stiffness", {"factor": 1.07})]))
@@ -227,7 +229,7 @@ def test_the_loop_acts_on_the_falsified_force(default_plan: Plan) -> None:
     assert np.max(np.abs(displacement)) > 1e-4
 
 
-def test_a_bias_of_the_force_moves_the_building_by_its_statics(default_plan: Plan) -> None:
+def test_a_bias_of_the_force_deflects_the_building_as_in_statics(default_plan: Plan) -> None:
     plan = with_test(default_plan, duration=20.0)
     still = np.zeros((2, plan.ticks + 1))
     system = lay(System(plan), [("sensor.column_force.bias", {"offset": 1000.0})])

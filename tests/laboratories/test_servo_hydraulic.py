@@ -1,4 +1,4 @@
-"""Servo-hydraulics in interaction with their specimen, against solutions of their equations by other means."""
+"""Servo-hydraulics in interaction with their specimen, against independent solutions of their equations."""
 
 from __future__ import annotations
 
@@ -112,14 +112,14 @@ def test_a_linear_specimen_is_solved_without_error(kind: str, delay: float) -> N
         np.testing.assert_allclose(got, wanted, atol=1e-8 * np.abs(wanted).max(), rtol=0)
 
 
-def test_the_interval_does_not_matter() -> None:
+def test_the_solution_is_exact_with_another_interval() -> None:
     values = commands(60, 0.002)
     found = run(column_lab.build(0.002, servo("ramp"), COLUMN), values)
     expected = solved(values, servo("ramp"), interval=0.002)
     np.testing.assert_allclose(found[:, 0], expected[:, 0], atol=1e-8 * np.abs(expected[:, 0]).max(), rtol=0)
 
 
-def test_compliance_mass_and_dashpot_of_effects_are_in_the_loop() -> None:
+def test_compliance_mass_and_dashpot_of_effects_act_inside_the_servo_loop() -> None:
     values = commands(300)
     lab = column_lab.build(
         DT,
@@ -151,7 +151,7 @@ def test_a_specimen_beyond_its_first_stiffness_is_solved_in_short_steps() -> Non
         assert error < 0.05 * np.abs(wanted - without).max()
 
 
-def test_a_yielding_specimen_keeps_its_memory() -> None:
+def test_a_yielding_specimens_history_is_kept_between_ticks() -> None:
     bilinear = Column(
         model="bilinear",
         stiffness=1.19e6,
@@ -168,7 +168,7 @@ def test_a_yielding_specimen_keeps_its_memory() -> None:
     assert work == pytest.approx(loop, rel=0.03)
 
 
-def test_its_inverse_at_low_frequency_is_the_published_one() -> None:
+def test_the_low_frequency_inverse_of_the_actuator_is_the_published_one() -> None:
     a, b = servo_hydraulic.rates(SERVO, COLUMN.stiffness, COLUMN.damping, COLUMN.mass, 0.0)
     state: Array = b[:, 0]
     moments = []
@@ -182,7 +182,7 @@ def test_its_inverse_at_low_frequency_is_the_published_one() -> None:
     assert inverse[1] / inverse[0] == pytest.approx(0.0251, abs=5e-5)  # s, its delay
 
 
-def test_the_flow_ends_where_the_valve_is_open() -> None:
+def test_the_flow_saturates_at_the_fully_open_valve() -> None:
     limit = 0.05
     lab = column_lab.build(DT, servo(), COLUMN, ActuatorEffects(velocity_limit=limit))
     fast = 5e-3 * np.sin(2.0 * np.pi * 5.0 * np.arange(2000) * DT)
@@ -212,7 +212,7 @@ def plan() -> Plan:
 
 
 def driven(command: Array) -> Array:
-    """The command of an actuator (m) with that of a motor that is none."""
+    """The command of an actuator (m) and a zero command in place of a motor's."""
     return np.stack([command, np.zeros_like(command)], axis=1)
 
 
@@ -231,7 +231,9 @@ def test_gain_and_dead_time_act_on_the_command(plan: Plan) -> None:
 @pytest.mark.parametrize(
     "entry", [("actuator.time_constant", {"factor": 1.3}), ("actuator.backlash", {"width": 2e-4})]
 )
-def test_effects_that_it_cannot_have_are_refused(plan: Plan, entry: tuple[str, dict[str, float]]) -> None:
+def test_effects_that_servo_hydraulics_cannot_have_are_refused(
+    plan: Plan, entry: tuple[str, dict[str, float]]
+) -> None:
     with pytest.raises(InputError, match=f"'{entry[0]}' needs the actuator model 'fopdt'"):
         lay(System(plan), [entry])
     with pytest.raises(InputError, match="cannot have the effect 'actuator.backlash'"):
@@ -240,13 +242,13 @@ def test_effects_that_it_cannot_have_are_refused(plan: Plan, entry: tuple[str, d
         column_lab.build(DT, servo(), Column())
 
 
-def test_a_record_may_begin_at_a_command_that_has_been_there_for_long(plan: Plan) -> None:
+def test_a_replay_may_begin_in_steady_state_under_a_constant_command(plan: Plan) -> None:
     found = replay.laboratory(KIND, System(plan), driven(np.full(200, 2e-3)), 2e-3)
     np.testing.assert_allclose(found[:, 0], 2e-3 / 0.9925416, rtol=1e-6)
     np.testing.assert_allclose(found[:, 1], 1.19e6 * 2e-3 / 0.9925416, rtol=1e-5)
 
 
-def test_the_lag_feels_mass_and_dashpot_of_its_specimen() -> None:
+def test_the_force_behind_a_lag_includes_mass_and_dashpot_of_the_specimen() -> None:
     lagging = Actuator(gain=1.0, delay=0.003, time_constant=0.02)
     t = np.arange(4000) * DT
     omega = 2.0 * np.pi * 6.0
@@ -261,7 +263,7 @@ def test_the_lag_feels_mass_and_dashpot_of_its_specimen() -> None:
     assert ratio.imag == pytest.approx(wanted.imag, rel=0.06)  # the differences are half a step late
 
 
-def test_the_plan_of_the_laboratory_alone_reads_what_the_loop_read(plan: Plan) -> None:
+def test_a_replay_of_the_laboratory_alone_gives_the_readings_of_the_loop(plan: Plan) -> None:
     short = with_test(plan, duration=0.5)
     for base in (short, with_table(short, "actuator", command="ramp")):
         ground = substructure.ground_rows(base, substructure.motion(base))

@@ -15,7 +15,7 @@ from simulation.virtual import VirtualTest
 
 
 def run(plan: Plan, path: Path, real: Reality | None = None) -> tuple[Run, Any, VirtualTest]:
-    """The recording of a test, the error that ended it, and its loops; without a reality the plan is true."""
+    """The recording of a test, the error that ended it, and its loops; without a reality they are as planned."""
     bench = virtual.assemble(plan, real or reality.as_planned(plan), path)
     error = virtual.run(bench, lambda: "")
     return read(path), error, bench

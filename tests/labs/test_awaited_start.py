@@ -61,7 +61,7 @@ def brief(default_plan: Plan) -> Plan:
     return with_test(default_plan, duration=0.2)
 
 
-def test_nothing_moves_before_the_operators_start_and_the_test_is_the_same(
+def test_nothing_moves_before_the_operators_start_and_the_readings_are_the_same(
     brief: Plan, tmp_path: Path
 ) -> None:
     plain = virtual.assemble(brief, reality.as_planned(brief), tmp_path / "plain.mcap", gate=Gate())
@@ -79,7 +79,7 @@ def test_nothing_moves_before_the_operators_start_and_the_test_is_the_same(
     assert [(event["lab"], event["text"]) for event in said] == [("master", "start: The test begins.")]
 
 
-def test_a_start_counts_once_and_only_for_a_test_that_waits_for_it(brief: Plan, tmp_path: Path) -> None:
+def test_a_start_is_accepted_once_and_only_by_a_test_that_waits_for_it(brief: Plan, tmp_path: Path) -> None:
     early = Bench(brief, tmp_path / "a.mcap", {0.0: "start", 4.9999999: "start", 5.0: "start"})
     assert early.error is None
     assert not early.answers[0.0]["master"].accepted
@@ -96,7 +96,7 @@ def test_an_armed_test_can_be_stopped(word: str, brief: Plan, tmp_path: Path) ->
     assert not ended.bench.master.ticks
 
 
-def test_rigs_that_nobody_starts_do_not_stay_armed(
+def test_rigs_are_disarmed_where_no_start_comes(
     brief: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for module in (handshake, loop):
@@ -126,7 +126,7 @@ def test_a_slave_that_falls_silent_while_the_rigs_wait_ends_the_test(brief: Plan
     assert "slave has been silent for 1 s" in str(error)
 
 
-def test_a_test_without_slaves_waits_too(tmp_path: Path) -> None:
+def test_a_test_without_slaves_also_waits_for_the_start(tmp_path: Path) -> None:
     plan = with_test(load(ROOT / "rths/plans/single_site.toml"), duration=0.2)
     late = Bench(plan, tmp_path / "a.mcap", {WAIT_S: "start"})
     assert late.error is None

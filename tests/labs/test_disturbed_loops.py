@@ -1,4 +1,4 @@
-"""What the loops of master and slave do about failing rigs, missing partners, late messages and other clocks."""
+"""The loops of master and slave with failing rigs, missing partners, late messages and other clocks."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def broken(plan: Plan, how: str) -> Reality:
         ("arm", RigError, "the pump is off"),
     ],
 )
-def test_a_rig_that_fails_stops_the_test_with_a_sentence(
+def test_a_rig_that_fails_stops_the_test_with_one_sentence(
     short_plan: Plan, tmp_path: Path, how: str, kind: type[Exception], sentence: str, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr("loop.rigs.find", lambda *_: BrokenLab)
@@ -138,7 +138,7 @@ def test_another_plan_or_protocol_is_refused_before_anything_moves(short_plan: P
         assert "refuse" in type(heard.message).__name__.lower()
 
 
-def test_a_slave_has_one_master(short_plan: Plan) -> None:
+def test_a_slave_ignores_a_second_master(short_plan: Plan) -> None:
     plan = without_recorder(short_plan)
     bench = virtual.assemble(plan, reality.as_planned(plan), None)
     bench.slave.take(Received(Register(5, PROTOCOL_VERSION, plan.digest())))
@@ -150,7 +150,7 @@ def test_a_slave_has_one_master(short_plan: Plan) -> None:
     assert bench.slave.lab.exchange.state is State.REGISTERED
 
 
-def test_nobody_there_is_said_in_the_time_the_plan_allows(short_plan: Plan) -> None:
+def test_a_slave_that_does_not_join_is_reported_within_the_connect_timeout(short_plan: Plan) -> None:
     plan = with_table(without_recorder(short_plan), "link", connect_timeout=2.0)
     bench = virtual.assemble(plan, reality.as_planned(plan), None)
     while not bench.master.lab.exchange.ended:
@@ -161,7 +161,7 @@ def test_nobody_there_is_said_in_the_time_the_plan_allows(short_plan: Plan) -> N
     assert str(bench.master.lab.error).startswith("No slave joined the test within 2 s")
 
 
-def test_a_slave_that_is_there_and_does_not_arm_is_named(short_plan: Plan) -> None:
+def test_a_slave_that_joins_and_does_not_arm_is_named(short_plan: Plan) -> None:
     plan = with_table(without_recorder(short_plan), "link", connect_timeout=2.0)
     bench = virtual.assemble(plan, reality.as_planned(plan), None)
     virtual.play(bench, pause=lambda: bench.master.lab.exchange.state is not State.IDLE)
@@ -173,7 +173,7 @@ def test_a_slave_that_is_there_and_does_not_arm_is_named(short_plan: Plan) -> No
     assert str(bench.master.lab.error).startswith("The slave did not arm its rig within 2 s")
 
 
-def test_a_missing_recorder_is_said(short_plan: Plan) -> None:
+def test_a_missing_recorder_is_reported(short_plan: Plan) -> None:
     plan = with_table(short_plan, "link", connect_timeout=2.0)
     bench = virtual.assemble(plan, reality.as_planned(plan), None)
     error = virtual.run(bench, lambda: "")
@@ -187,7 +187,7 @@ def bench(short_plan: Plan) -> VirtualTest:
     return running(without_recorder(short_plan), 100)
 
 
-def test_a_silent_slave_is_lost_and_nothing_more_moves(bench: VirtualTest) -> None:
+def test_a_silent_slave_counts_as_lost_and_nothing_moves_afterwards(bench: VirtualTest) -> None:
     for tick in range(100, 100 + 501):
         bench.world.time = bench.master.lab.tick_ns(tick)
         bench.master.tick(tick)
@@ -202,7 +202,7 @@ def test_a_silent_slave_is_lost_and_nothing_more_moves(bench: VirtualTest) -> No
 
 
 @pytest.mark.parametrize(("done", "completed"), [(1000, True), (999, False)])
-def test_a_slave_that_has_fallen_behind_knows_a_test_that_the_master_completed(
+def test_a_slave_a_few_ticks_behind_takes_the_masters_end_as_a_completed_test(
     done: int, completed: bool, bench: VirtualTest
 ) -> None:
     assert not bench.slave.completed
@@ -213,7 +213,9 @@ def test_a_slave_that_has_fallen_behind_knows_a_test_that_the_master_completed(
     assert bench.slave.completed is completed
 
 
-def test_an_exchange_that_was_asked_again_and_answered_twice_is_not_lost(short_plan: Plan) -> None:
+def test_a_clock_exchange_that_is_repeated_and_answered_twice_does_not_count_as_lost(
+    short_plan: Plan,
+) -> None:
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), None)
     partner = bench.master.partners["slave"]
     partner.synchronise(0)
@@ -226,7 +228,7 @@ def test_an_exchange_that_was_asked_again_and_answered_twice_is_not_lost(short_p
     assert partner.lost == 0
 
 
-def test_a_slave_without_commands_keeps_the_last_one_and_goes_on_measuring_until_it_ramps(
+def test_a_slave_without_commands_holds_the_last_one_and_measures_until_it_ramps(
     bench: VirtualTest,
 ) -> None:
     before = bench.slave._command
@@ -242,7 +244,7 @@ def test_a_slave_without_commands_keeps_the_last_one_and_goes_on_measuring_until
     assert bench.slave.lab.safety.mode is Mode.RAMPING
 
 
-def test_a_tick_that_comes_a_whole_interval_late_moves_nothing_and_sends_nothing(bench: VirtualTest) -> None:
+def test_a_tick_that_is_a_whole_interval_late_moves_nothing_and_sends_nothing(bench: VirtualTest) -> None:
     command = bench.master._command
     while bench.endpoints["slave"].receive() is not None:
         pass
@@ -301,7 +303,7 @@ def test_a_link_plug_in_delays_and_loses_messages(short_plan: Plan, tmp_path: Pa
     assert np.allclose(ages[30:36], [0.002, 0.004, 0.002, 0.002, 0.004, 0.002])
 
 
-def test_clocks_that_differ_and_drift_apart_do_not_shift_the_laboratories(
+def test_clock_offset_and_drift_do_not_shift_the_laboratories_in_time(
     short_plan: Plan, tmp_path: Path
 ) -> None:
     gain = 500e-6  # a millisecond in two seconds
@@ -329,7 +331,7 @@ class OneWay:
         return 0.005 if direction == "feedback" else 0.0
 
 
-def test_a_plug_ins_delay_is_in_the_stamps_and_not_in_the_clocks_offset(
+def test_a_plug_ins_delay_is_in_the_time_stamps_and_not_in_the_clock_offset(
     short_plan: Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr("loop.links.find", lambda *_: OneWay)

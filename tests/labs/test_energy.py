@@ -1,4 +1,4 @@
-"""Energies that the master watches, against a closed form, the indicator of a recording and the sum of all works."""
+"""The energies that the master watches, compared with a closed form, a recording's indicator and the works."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def given(chosen: Plan, run: Run) -> Any:
 
 
 @pytest.mark.parametrize("delay", [0.012, 0.04, -0.01])
-def test_a_delayed_spring_gives_what_the_closed_form_says(delay: float) -> None:
+def test_the_error_energy_of_a_delayed_spring_agrees_with_the_closed_form(delay: float) -> None:
     amplitude, omega, stiffness, cycles = 2e-3, 2.0 * math.pi * 2.0, 12.5e6, 3
     chosen = Plan()
     monitor = EnergyMonitor(chosen)
@@ -78,7 +78,7 @@ def test_a_delayed_spring_gives_what_the_closed_form_says(delay: float) -> None:
     assert np.diff(work[each::each]) == pytest.approx([cycle] * cycles, rel=1e-3)
 
 
-def test_the_running_energy_is_the_indicator_of_the_recording(tmp_path: Path) -> None:
+def test_the_running_error_energy_equals_the_indicator_of_the_recording(tmp_path: Path) -> None:
     chosen = plans.with_test(plans.load(cli.plan_path("paper")), duration=6.0)
     run = recorded(chosen, tmp_path / "paper.mcap")
     of, column = run.columns["master"], chosen.column
@@ -98,7 +98,7 @@ def test_the_running_energy_is_the_indicator_of_the_recording(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("name", ["default", "two_dampers"])
-def test_the_drift_is_kinetic_energy_and_all_works_without_a_rest(name: str, tmp_path: Path) -> None:
+def test_the_energy_drift_is_the_balance_of_kinetic_energy_and_all_works(name: str, tmp_path: Path) -> None:
     chosen = plans.with_test(plans.load(cli.plan_path(name)), duration=3.0)
     run = recorded(chosen, tmp_path / "works.mcap")
     of, ticks = run.columns["master"], run.ticks("master")
@@ -125,7 +125,7 @@ def test_the_drift_is_kinetic_energy_and_all_works_without_a_rest(name: str, tmp
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", ["default", "two_dampers"])
-def test_a_stable_integration_makes_no_energy(name: str, kind: str, tmp_path: Path) -> None:
+def test_a_stable_integration_generates_no_energy(name: str, kind: str, tmp_path: Path) -> None:
     chosen = with_table(
         plans.with_test(plans.load(cli.plan_path(name)), duration=4.0), "structure", integrator=kind
     )
@@ -141,7 +141,7 @@ def test_a_storey_without_stiffness_is_not_judged() -> None:
     assert monitor.error_energy == monitor.numerical_drift == 0.0
 
 
-def test_nan_is_beyond_both_limits() -> None:
+def test_nan_exceeds_both_energy_limits() -> None:
     found = EnergyMonitor(Plan()).violation(ColumnMeasurement(0.0, math.nan), outputs(0.0))
     assert found is not None
     assert found.name == "error_energy"

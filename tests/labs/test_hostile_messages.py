@@ -1,4 +1,4 @@
-"""Valid messages at the wrong moment, which only a hostile sender has."""
+"""Valid messages at the wrong moment, as only a hostile sender sends them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ from simulation import virtual
 
 
 @pytest.mark.parametrize("state", [State.ARMED, State.SCHEDULED, State.RUNNING, State.STOPPING])
-def test_a_slave_whose_place_is_said_to_be_taken_during_its_test_goes_on(
-    short_plan: Plan, state: State
-) -> None:
+def test_a_running_slave_ignores_an_arm_message_for_another_instance(short_plan: Plan, state: State) -> None:
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), None)
     bench.slave.take(Received(Register(5, PROTOCOL_VERSION, short_plan.digest())))
     bench.slave.lab.exchange.state = state

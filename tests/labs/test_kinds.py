@@ -65,7 +65,7 @@ def test_every_shape_of_test_equals_the_compiled_rollout_and_ends_at_rest(name: 
 
 
 @pytest.mark.parametrize("role", ["slave.east", "master"])
-def test_a_limit_of_either_column_brings_both_to_rest_unloaded(role: str, tmp_path: Path) -> None:
+def test_a_limit_at_either_column_brings_both_to_rest_unloaded(role: str, tmp_path: Path) -> None:
     plan = short("two_columns")
     _, whole = played(plan, tmp_path / "a.mcap")
     force = {lab: abs(whole.columns[lab]["column_force"]).max() for lab in ("master", "slave.east")}
@@ -79,7 +79,7 @@ def test_a_limit_of_either_column_brings_both_to_rest_unloaded(role: str, tmp_pa
         assert abs(ramp["column_force"][-1]) < 0.1 * force[lab]
 
 
-def test_a_slave_without_a_word_ends_the_test_and_the_other_column_unloads(tmp_path: Path) -> None:
+def test_a_silent_slave_ends_the_test_and_the_other_column_unloads(tmp_path: Path) -> None:
     plan = with_table(short("two_columns"), "link", loss_timeout=0.1)
     plan = with_table(plan, "recording", patience=0.5)
     bench = virtual.assemble(plan, as_planned(plan), tmp_path / "a.mcap")

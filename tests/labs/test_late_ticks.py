@@ -1,4 +1,4 @@
-"""Processes that the host pauses, on a simulated clock: an emulation catches up, and with a rig the test stops."""
+"""Processes that the host pauses, on a simulated clock: emulated laboratories catch up, a rig stops the test."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STRONG = (0.9, 1.4, 1.65, 1.9, 2.2, 2.4)  # s, up to the strongest motion of the
 
 
 def played(plan: Plan, path: Path, pauses: dict[str, tuple[float, ...]], seconds: float = PAUSE) -> Run:
-    """The recording of a test whose processes stand still now and then; times from about the first tick."""
+    """The recording of a test whose processes are paused at these times, counted from about the first tick."""
     simulation = Simulation(plan, reality.as_planned(plan), Surrounding(seed=1, recording=path))
     world, master = simulation.world, simulation.loops[MASTER].lab
 
@@ -54,7 +54,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 @pytest.mark.parametrize("paused", [(MASTER,), (SLAVE,), (MASTER, SLAVE)])
-def test_an_emulation_bears_pauses_of_50_ms_and_counts_them(
+def test_an_emulated_test_tolerates_pauses_of_50_ms_and_counts_them(
     paused: tuple[str, ...], tmp_path: Path, undisturbed: Run
 ) -> None:
     run = played(EMULATED, tmp_path / "a.mcap", dict.fromkeys(paused, STRONG))
@@ -71,7 +71,7 @@ def test_an_emulation_bears_pauses_of_50_ms_and_counts_them(
     assert np.max(np.abs(column - still)) < 0.2 * np.max(np.abs(still))  # the damper alone is late
 
 
-def test_an_emulation_bears_the_swing_of_the_damper_while_the_master_stands_still_for_half_a_second(
+def test_an_emulated_test_tolerates_the_dampers_swing_while_the_master_pauses_for_half_a_second(
     tmp_path: Path,
 ) -> None:
     run = played(EMULATED, tmp_path / "a.mcap", {MASTER: (SWINGS,)}, seconds=0.5)
@@ -96,7 +96,7 @@ SLAVES_OF_OTHER_KINDS: dict[str, tuple[Path, str, dict[str, Any]]] = {
 
 
 @pytest.mark.parametrize("kind", SLAVES_OF_OTHER_KINDS)
-def test_a_slave_of_another_kind_bears_them_too(kind: str, tmp_path: Path) -> None:
+def test_a_slave_of_another_kind_tolerates_pauses(kind: str, tmp_path: Path) -> None:
     file, role, _ = SLAVES_OF_OTHER_KINDS[kind]
     plan = plans.with_test(plans.load(file), duration=EMULATED.test.duration)
     summary = summarize(played(plan, tmp_path / "a.mcap", {MASTER: STRONG[::2], role: STRONG[1::2]}))
@@ -105,7 +105,9 @@ def test_a_slave_of_another_kind_bears_them_too(kind: str, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("kind", SLAVES_OF_OTHER_KINDS)
-def test_limits_that_the_plan_writes_out_stop_such_a_slave(kind: str, tmp_path: Path) -> None:
+def test_limits_given_in_the_plan_stop_a_slave_of_another_kind_after_a_pause(
+    kind: str, tmp_path: Path
+) -> None:
     file, _, strict = SLAVES_OF_OTHER_KINDS[kind]
     plan = plans.load(file)
     tables = plan.written()
@@ -117,19 +119,19 @@ def test_limits_that_the_plan_writes_out_stop_such_a_slave(kind: str, tmp_path: 
     assert limit["text"].endswith(" m/s.")
 
 
-def test_what_is_patient_is_told_with_its_reason(undisturbed: Run) -> None:
+def test_the_summary_states_the_relaxed_limits_with_their_reason(undisturbed: Run) -> None:
     summary: Any = summarize(undisturbed)
     assert summary["patience"] == patience.sentence(EMULATED) == undisturbed.metadata["summary"]["patience"]
     assert summary["warnings"] == []
     assert summary["late_ticks"] == 0
 
 
-def test_with_the_figures_of_a_rig_the_same_pause_ends_the_test(tmp_path: Path) -> None:
+def test_with_the_limits_of_a_rig_the_same_pause_ends_the_test(tmp_path: Path) -> None:
     run = played(patience.strict(EMULATED), tmp_path / "a.mcap", {MASTER: (2.2,)})
     assert run.metadata["summary"]["outcome"] in ("overrun", "watchdog")
     assert "patience" not in run.metadata["summary"]
 
 
-def test_a_pause_beyond_the_patience_ends_an_emulation_too(tmp_path: Path) -> None:
+def test_a_pause_beyond_the_relaxed_limits_ends_an_emulated_test(tmp_path: Path) -> None:
     run = played(EMULATED, tmp_path / "a.mcap", {SLAVE: (0.2,)}, seconds=1.15 * patience.PATIENCE)
     assert {event["code"] for event in run.events if event["level"] == "error"} >= {"watchdog", "overrun"}

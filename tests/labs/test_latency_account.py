@@ -1,4 +1,4 @@
-"""Where the time of a tick went, on simulated clocks and a simulated network whose truth is known."""
+"""The segments of a tick's latency, on simulated clocks and a simulated network with known delays."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def quick(seed: int) -> Delays:
 
 
 def planted(base: Delays, way: int, since: int) -> Delays:
-    """The delays of `base`, and three milliseconds more on one way from a moment on."""
+    """The delays of `base`, with three milliseconds more in one direction from a moment on."""
 
     drawn: dict[int, tuple[int, int]] = {}
 
@@ -112,7 +112,7 @@ AHEAD, BEHIND = Clock(SECOND, 50.0), Clock(-SECOND, -50.0)
 
 @pytest.mark.parametrize(("way", "segment"), [(0, "command_one_way"), (1, "feedback_one_way")])
 @pytest.mark.parametrize(("master", "slave"), [(AHEAD, BEHIND), (BEHIND, AHEAD), (Clock(0, 0.0), AHEAD)])
-def test_a_delay_on_the_wire_shows_as_its_segment(
+def test_a_delay_on_the_wire_appears_in_its_segment(
     short_plan: Plan, way: int, segment: str, master: Clock, slave: Clock
 ) -> None:
     since = 3 * SECOND
@@ -126,14 +126,14 @@ def test_a_delay_on_the_wire_shows_as_its_segment(
     )
 
 
-def test_a_plug_ins_delay_shows_as_its_segment_from_the_first_tick_on(short_plan: Plan) -> None:
+def test_a_plug_ins_delay_appears_in_its_segment_from_the_first_tick_on(short_plan: Plan) -> None:
     found = Trial(short_plan, BEHIND, AHEAD, planted(quick(5), 0, 10**18), extra=0.003).play(4_000)
     assert np.max(np.abs(found["feedback_one_way"] - found["back"] - 0.003)) < 0.2e-3
     assert np.max(np.abs(found["command_one_way"] - found["there"])) < 0.2e-3
     assert np.all(found["deadline_missed"])
 
 
-def test_a_delay_that_was_always_there_cannot_be_told_from_an_offset_and_the_bound_says_so(
+def test_a_constant_one_way_delay_shifts_the_clock_offset_within_its_bound(
     short_plan: Plan,
 ) -> None:
     found = Trial(short_plan, AHEAD, BEHIND, planted(quick(6), 1, 0)).play(2_000)
@@ -143,7 +143,7 @@ def test_a_delay_that_was_always_there_cannot_be_told_from_an_offset_and_the_bou
     assert np.median(found["round_trip"]) == pytest.approx(3.25e-3, abs=0.1e-3)  # this one is certain
 
 
-def test_the_segments_add_up_to_the_whole(short_plan: Plan) -> None:
+def test_the_latency_segments_add_up_to_the_total(short_plan: Plan) -> None:
     found = Trial(short_plan, AHEAD, BEHIND, planted(quick(7), 0, 10**18)).play(1_000)
     parts = found["command_one_way"] + found["slave_time"] + found["feedback_one_way"]
     assert np.allclose(parts, found["round_trip"], atol=2e-9)

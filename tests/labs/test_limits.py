@@ -74,7 +74,7 @@ class Watched:
 
 
 def played(chosen: Plan, real: Reality | None = None) -> tuple[VirtualTest, Any, dict[str, Watched]]:
-    """A test without recorder whose rigs are watched, to its end."""
+    """Plays a test without a recorder to its end; its rigs are watched."""
     chosen = without_recorder(chosen)
     real = dataclasses.replace(real, plan=without_recorder(real.plan)) if real else reality.as_planned(chosen)
     bench = virtual.assemble(chosen, real, None)
@@ -86,7 +86,7 @@ def played(chosen: Plan, real: Reality | None = None) -> tuple[VirtualTest, Any,
 
 
 def first_beyond(values: Any, most: float, lasting: int) -> int:
-    """The tick at which a series has been beyond a limit for so many ticks in a row."""
+    """The tick at which a series has been beyond a limit for this many ticks in a row."""
     beyond = np.abs(values) > most
     return next(
         tick for tick in range(lasting - 1, beyond.size) if beyond[tick - lasting + 1 : tick + 1].all()
@@ -119,7 +119,7 @@ def test_a_limit_stops_its_laboratory_before_the_rig_sees_the_command(
     assert all(np.array_equal(late, wanted[tick - 1]) for late in written[tick:])
 
 
-def test_a_test_within_its_limits_is_the_same_to_the_bit(short_plan: Plan, recording: Run) -> None:
+def test_limits_that_are_not_reached_change_no_bit_of_a_test(short_plan: Plan, recording: Run) -> None:
     fields = {field.name: field for field in dataclasses.fields(Limits)}
     free = {name: math.inf for name, field in fields.items() if field.metadata["rule"].infinite}
     _, error, rigs = played(with_table(short_plan, "limits", **free))
@@ -129,7 +129,7 @@ def test_a_test_within_its_limits_is_the_same_to_the_bit(short_plan: Plan, recor
     )
 
 
-def test_every_slave_is_stopped_by_its_own_rates(tmp_path: Path) -> None:
+def test_every_slave_is_stopped_by_the_rate_limits_of_its_own_commands(tmp_path: Path) -> None:
     chosen = with_test(plans.load(cli.plan_path("two_dampers")), duration=2.0)
     path = tmp_path / "two.mcap"
     assert virtual.run(virtual.assemble(chosen, reality.as_planned(chosen), path), str) is None
@@ -159,7 +159,7 @@ def test_a_limit_on_the_building_holds_for_every_storey(tmp_path: Path) -> None:
         assert bench.master.ticks == first_beyond(storeys.max(axis=1), most, 1) + 1
 
 
-def test_a_held_tick_does_not_move_what_rates_are_measured_from(short_plan: Plan) -> None:
+def test_a_held_tick_counts_as_a_rate_of_zero(short_plan: Plan) -> None:
     bench = running(without_recorder(short_plan), 100)
     before = bench.master._command
     bench.world.time = bench.master.lab.tick_ns(101)  # a whole interval late
@@ -181,7 +181,7 @@ def nominal_peak(chosen: Plan) -> float:
 
 @pytest.mark.parametrize("amd", [True, False])
 @pytest.mark.parametrize("delay", [0.06, 0.08])
-def test_an_unstable_delay_is_stopped_before_the_building_moves_more_than_it_should(
+def test_a_loop_with_an_unstable_delay_is_stopped_before_the_building_moves_too_far(
     delay: float, amd: bool, default_plan: Plan
 ) -> None:
     chosen = with_table(with_test(default_plan, duration=10.0), "control", amd=amd)
@@ -211,7 +211,7 @@ def test_a_slow_actuator_is_stopped_by_the_energy_it_feeds_in(default_plan: Plan
 
 
 class Leaping(MasterStep):
-    """Commands that leap by 10 mm at the tick 500."""
+    """Commands that jump by 10 mm at tick 500."""
 
     def __call__(self, tick: int, *measured: Any) -> Outputs:
         outputs = super().__call__(tick, *measured)
@@ -231,8 +231,10 @@ def test_a_step_of_ten_millimetres_is_never_written(short_plan: Plan) -> None:
     assert largest(np.diff(np.array(rig.written)[:, 0])) < 1e-3
 
 
-def test_an_integration_that_diverges_is_stopped_long_before_the_displacement(monkeypatch: Any) -> None:
-    """Eight storeys whose highest mode is beyond what the explicit method bears."""
+def test_a_diverging_integration_trips_the_energy_limit_long_before_the_displacement_limit(
+    monkeypatch: Any,
+) -> None:
+    """Eight storeys whose highest mode is beyond the stability limit of the explicit method."""
     monkeypatch.setattr(integrators, "check_stability", lambda *_: None)
     tables = {
         "test": {"interval": 0.02, "duration": 20.0},

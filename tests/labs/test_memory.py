@@ -1,4 +1,4 @@
-"""The memory and files that all three processes together take as a test goes on, in virtual time."""
+"""The memory and the open files of all three processes while a test goes on, in virtual time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST = 8.0  # bytes a tick; the recording's index takes 1.5
 
 
 @pytest.mark.slow
-def test_a_test_that_goes_on_takes_no_more_memory(default_plan: Plan, tmp_path: Path) -> None:
+def test_memory_use_does_not_grow_during_a_test(default_plan: Plan, tmp_path: Path) -> None:
     plan = with_table(default_plan.with_ticks(TO + BLOCK), "recording", patience=0.5)
     assert KEPT_FROM + kept_seconds(plan) < FROM * plan.test.interval
     bench = virtual.assemble(plan, reality.as_planned(plan), tmp_path / "a.mcap")

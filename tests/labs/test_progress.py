@@ -15,7 +15,7 @@ from tests.helpers import ROOT
 
 
 @pytest.mark.parametrize("name", ["default", "two_dampers"])
-def test_progress_has_the_newest_drift_forces_and_late_ticks(name: str, tmp_path: Path) -> None:
+def test_progress_shows_the_newest_drift_forces_and_late_ticks(name: str, tmp_path: Path) -> None:
     test: Plan = plans.with_test(plans.load(ROOT / f"rths/plans/{name}.toml"), duration=0.5)
     bench = virtual.assemble(test, reality.as_planned(test), tmp_path / "a.mcap")
     assert virtual.run(bench, lambda: "") is None

@@ -1,4 +1,4 @@
-"""How both laboratories come to rest, in virtual time: after limits, failures, stops, and at an orderly end."""
+"""Both laboratories come to rest in virtual time after limits, failures, stops, and an orderly end."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TRIP = 300  # tick
 
 
 def played(plan: Plan, path: Path, upset: Any = None) -> tuple[VirtualTest, Run]:
-    """A test in virtual time; `upset` is told of every tick before it."""
+    """A test in virtual time; `upset` is called before every tick."""
     bench = virtual.assemble(plan, reality.as_planned(plan), path)
     if upset is not None:
         ticking = bench.master.tick
@@ -49,7 +49,7 @@ def turns(run: Run, lab: str) -> list[str]:
     return [event["text"] for event in run.events if event["lab"] == lab and event["code"] == "mode"]
 
 
-def test_an_orderly_end_is_a_ramp_to_an_unloaded_specimen(short_plan: Plan, tmp_path: Path) -> None:
+def test_an_orderly_end_ramps_to_an_unloaded_specimen(short_plan: Plan, tmp_path: Path) -> None:
     bench, run = played(short_plan, tmp_path / "a.mcap")
     for role, loop in bench.loops.items():
         assert loop.lab.safety.mode is Mode.IDLE
@@ -85,7 +85,9 @@ def test_a_violated_limit_is_never_written_and_both_come_to_rest(
         assert safe["values"]["duration"] > 0.0
 
 
-def test_virtual_time_waits_for_no_operator(short_plan: Plan, tmp_path: Path) -> None:
+def test_a_test_in_virtual_time_does_not_wait_for_an_operators_reset(
+    short_plan: Plan, tmp_path: Path
+) -> None:
     plan = with_table(short_plan, "limits", column_force=12e3)
     bench, run = played(with_table(plan, "safety", wait_for_reset=True), tmp_path / "a.mcap")
     assert {loop.lab.safety.mode for loop in bench.loops.values()} == {Mode.SAFE}
@@ -93,7 +95,7 @@ def test_virtual_time_waits_for_no_operator(short_plan: Plan, tmp_path: Path) ->
     assert run.finished
 
 
-def test_the_ramp_begins_where_the_last_command_was_without_a_step(short_plan: Plan, tmp_path: Path) -> None:
+def test_the_ramp_begins_at_the_last_command_without_a_step(short_plan: Plan, tmp_path: Path) -> None:
     plan = with_table(short_plan, "limits", column_force=12e3)
     _, run = played(plan, tmp_path / "a.mcap")
     for role, name in (("master", "actuator_command"), ("slave", "table_command")):
@@ -106,7 +108,7 @@ def test_the_ramp_begins_where_the_last_command_was_without_a_step(short_plan: P
     assert np.flatnonzero(release == 0.0)[0] <= round(0.02 / 0.002)
 
 
-def test_a_rig_that_fails_comes_to_rest_blind(short_plan: Plan, tmp_path: Path) -> None:
+def test_a_rig_whose_readings_fail_comes_to_rest_without_them(short_plan: Plan, tmp_path: Path) -> None:
     def fail(bench: VirtualTest, tick: int) -> None:
         if tick == TRIP:
             bench.master._rig.read = broken  # type: ignore[method-assign]
@@ -121,7 +123,7 @@ def test_a_rig_that_fails_comes_to_rest_blind(short_plan: Plan, tmp_path: Path) 
     assert np.ptp(commands[-20:]) == 0.0
 
 
-def test_an_emergency_stop_of_a_rig_stops_it_at_once_and_the_other_by_its_ramp(
+def test_an_emergency_stop_stops_its_own_rig_at_once_and_the_other_by_a_ramp(
     short_plan: Plan, tmp_path: Path
 ) -> None:
     disarmed: list[int] = []
@@ -155,7 +157,7 @@ def latched(short_plan: Plan) -> VirtualTest:
     bench = virtual.assemble(plan, reality.as_planned(plan), None)
 
     def nothing(*, last: bool = False) -> None:
-        """No last words: they are still there."""
+        """Keeps the laboratories from saying goodbye, because they are still there."""
 
     bench.master.leave = bench.slave.leave = nothing  # type: ignore[method-assign]
     virtual.run(bench, str)
@@ -190,7 +192,7 @@ def test_a_reset_needs_the_cause_to_be_gone_and_a_new_press(latched: VirtualTest
     assert not loop.lab.safety.latched
 
 
-def test_a_press_before_the_trip_resets_nothing(short_plan: Plan) -> None:
+def test_a_reset_pressed_before_the_trip_has_no_effect(short_plan: Plan) -> None:
     plan = without_recorder(short_plan)
     bench = virtual.assemble(plan, reality.as_planned(plan), None)
     answer = pressed(bench, "reset", 7)
@@ -198,13 +200,13 @@ def test_a_press_before_the_trip_resets_nothing(short_plan: Plan) -> None:
     assert "nothing to reset" in answer.text
 
 
-def test_an_operator_of_another_plan_is_not_heard(latched: VirtualTest) -> None:
+def test_an_operator_with_another_plan_is_ignored(latched: VirtualTest) -> None:
     wish = Operator(0, "another", "reset", 3, "")
     latched.master.take(Received(wish, "operator", latched.world.time))
     assert latched.master.lab.safety.latched
 
 
-def test_an_emergency_stop_works_at_rest_too(latched: VirtualTest) -> None:
+def test_an_emergency_stop_works_at_rest(latched: VirtualTest) -> None:
     assert pressed(latched, "emergency", 4).accepted
     assert latched.master.lab.safety.mode is Mode.EMERGENCY_STOP
 
@@ -212,7 +214,7 @@ def test_an_emergency_stop_works_at_rest_too(latched: VirtualTest) -> None:
 # -- accounts ---------------------------------------------------------------------------------------
 
 
-def test_every_message_is_accounted_for(short_plan: Plan, tmp_path: Path) -> None:
+def test_every_sent_message_is_counted_as_used(short_plan: Plan, tmp_path: Path) -> None:
     _, run = played(short_plan, tmp_path / "a.mcap")
     found = accounts(run)
     ticks = short_plan.ticks

@@ -69,7 +69,7 @@ def replays(found: Run) -> bool:
 
 
 @pytest.mark.parametrize("count", [1, 2, 4, 8, 16])
-def test_any_number_of_slaves_is_played_recorded_whole_and_replayed_to_the_last_bit(
+def test_a_test_with_any_number_of_slaves_is_recorded_completely_and_replayed_to_the_last_bit(
     count: int, tmp_path: Path
 ) -> None:
     chosen = tall(*(f"lab{place}" for place in range(count)), duration=1.0)
@@ -84,7 +84,9 @@ def test_any_number_of_slaves_is_played_recorded_whole_and_replayed_to_the_last_
     assert replays(found)
 
 
-def test_both_ends_of_every_exchange_are_recorded_and_no_slave_has_anothers_commands(recording: Run) -> None:
+def test_both_ends_of_every_exchange_are_recorded_and_each_slave_gets_only_its_own_commands(
+    recording: Run,
+) -> None:
     for place, role in enumerate(recording.roles):
         for name in ("table_target", "damper_command", "table_target_jerk"):
             sent = recording.columns["master"][name][:, place]
@@ -94,7 +96,7 @@ def test_both_ends_of_every_exchange_are_recorded_and_no_slave_has_anothers_comm
     assert largest(np.diff(recording.columns["master"]["table_target"], axis=1)) > 1e-4
 
 
-def test_one_slave_with_a_name_is_the_slave_without(
+def test_a_single_named_slave_gives_the_same_test_as_an_unnamed_one(
     short_plan: Plan, virtual_recording: Path, tmp_path: Path
 ) -> None:
     chosen = from_tables(short_plan.tables() | {"slave": {"roof": {}}}, short_plan.base)
@@ -106,7 +108,7 @@ def test_one_slave_with_a_name_is_the_slave_without(
             assert np.array_equal(values, named.columns[topic][name]), f"{topic}/{name}"
 
 
-def test_two_slaves_that_each_carry_half_a_damper_are_one(short_plan: Plan) -> None:
+def test_two_slaves_with_half_a_damper_each_equal_one_slave_with_the_whole(short_plan: Plan) -> None:
     half = {
         "damper": {"force_scale": short_plan.damper.force_scale / 2},
         "control": {"gain": short_plan.control.gain / 2},
@@ -120,7 +122,7 @@ def test_two_slaves_that_each_carry_half_a_damper_are_one(short_plan: Plan) -> N
         assert np.allclose(columns["damper_stroke"], whole["damper_stroke"], rtol=0.0, atol=1e-13)
 
 
-def test_the_first_slaves_noise_is_that_of_the_only_one(tmp_path: Path) -> None:
+def test_the_first_of_two_slaves_has_the_same_noise_as_a_single_slave(tmp_path: Path) -> None:
     one, _, _ = run(tall("roof"), tmp_path / "one.mcap")
     two, _, _ = run(TWO, tmp_path / "two.mcap")
     noise = [
@@ -139,7 +141,7 @@ class LateRoof:
         return 0.003 if self.late and direction == "feedback" and seq % 3 == 0 else 0.0
 
 
-def test_late_messages_of_one_slave_affect_that_one_alone(tmp_path: Path, monkeypatch: Any) -> None:
+def test_late_messages_of_one_slave_affect_that_slave_only(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr("loop.links.find", lambda *_: LateRoof)
     real = dataclasses.replace(reality.as_planned(TWO), link=RigTable("x:LateRoof"))
     found, error, _ = run(TWO, tmp_path / "late.mcap", real)
@@ -153,7 +155,7 @@ def test_late_messages_of_one_slave_affect_that_one_alone(tmp_path: Path, monkey
     assert replays(found)
 
 
-def test_an_effect_of_one_slave_is_laid_over_that_one_alone(recording: Run, tmp_path: Path) -> None:
+def test_an_effect_on_one_slave_applies_to_that_slave_only(recording: Run, tmp_path: Path) -> None:
     path = tmp_path / "reality.toml"
     path.write_text("[[effect]]\nname = 'sensor.damper_stroke.bias'\noffset = 0.2\nslave = 'middle'\n")
     found, error, _ = run(TWO, tmp_path / "biased.mcap", reality.load(path, TWO))
@@ -165,7 +167,7 @@ def test_an_effect_of_one_slave_is_laid_over_that_one_alone(recording: Run, tmp_
     assert "bias" not in repr(found.metadata) + repr(found.events)
 
 
-def test_an_effect_on_the_building_belongs_to_no_slave(tmp_path: Path) -> None:
+def test_an_effect_on_the_building_that_names_a_slave_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "reality.toml"
     path.write_text("[[effect]]\nname = 'structure.mass'\nfactor = 1.1\nslave = 'roof'\n")
     with pytest.raises(
@@ -175,7 +177,7 @@ def test_an_effect_on_the_building_belongs_to_no_slave(tmp_path: Path) -> None:
 
 
 class BrokenTable:
-    """A laboratory B that fails at a tick."""
+    """A laboratory B whose rig fails at a given tick."""
 
     def __init__(self, interval: float, seed: int) -> None:
         self.tick = 0
@@ -234,7 +236,7 @@ def test_a_slave_that_falls_silent_is_named_and_all_others_are_told() -> None:
     assert str(roof).startswith("The master stopped the test: No valid feedback from the slave 'middle'")
 
 
-def test_a_slave_that_never_comes_is_named_with_how_to_start_it() -> None:
+def test_a_slave_that_never_joins_is_named_with_the_command_that_starts_it() -> None:
     chosen = dataclasses.replace(
         without_recorder(TWO), link=dataclasses.replace(TWO.link, connect_timeout=2.0)
     )
@@ -248,7 +250,7 @@ def test_a_slave_that_never_comes_is_named_with_how_to_start_it() -> None:
     assert bench.slave.lab.exchange.state is State.TRIPPED
 
 
-def test_no_slave_is_armed_before_all_have_registered() -> None:
+def test_slaves_are_armed_only_after_all_have_registered() -> None:
     bench = virtual.assemble(without_recorder(TWO), reality.as_planned(TWO), None)
     late = bench.slaves.pop("slave.middle")
     virtual.play(bench, pause=lambda: bench.world.time > 500_000_000)
@@ -260,7 +262,7 @@ def test_no_slave_is_armed_before_all_have_registered() -> None:
     assert {slave.lab.start_ns for slave in bench.slaves.values()} == {bench.master.lab.start_ns}
 
 
-def test_what_another_role_says_counts_for_that_role_alone() -> None:
+def test_a_feedback_is_used_only_for_the_slave_that_sent_it() -> None:
     bench = running(without_recorder(TWO), 100)
     session = bench.master.lab.exchange.session
     roof, middle = bench.master.partners.values()
@@ -278,7 +280,9 @@ def test_what_another_role_says_counts_for_that_role_alone() -> None:
 
 
 @pytest.mark.parametrize("named", [True, False])
-def test_the_second_process_of_a_name_is_refused_and_the_test_goes_on(named: bool, short_plan: Plan) -> None:
+def test_a_second_process_of_the_same_slave_is_refused_and_the_test_goes_on(
+    named: bool, short_plan: Plan
+) -> None:
     chosen = without_recorder(TWO if named else short_plan)
     bench = running(chosen, 100)
     role = chosen.roles[0]
@@ -306,7 +310,7 @@ def test_the_second_process_of_a_name_is_refused_and_the_test_goes_on(named: boo
     assert bench.slave.lab.running
 
 
-def test_of_two_processes_that_register_the_first_is_armed() -> None:
+def test_if_two_processes_register_as_one_slave_only_the_first_is_armed() -> None:
     chosen = without_recorder(TWO)
     bench = virtual.assemble(chosen, reality.as_planned(chosen), None)
     role, first = "slave.roof", bench.slaves["slave.roof"]
@@ -341,11 +345,11 @@ def test_the_shipped_plan_reduces_the_motion() -> None:
 
 
 def stray(**changes: Any) -> Received:
-    """What a recorder outside the test says."""
+    """A message of a recorder outside the test."""
     return Received(Recorder(0, "failed", "", "stopped by the user", b"")._replace(**changes), "recorder")
 
 
-def test_a_recorder_of_no_session_or_another_disturbs_no_test(short_plan: Plan, tmp_path: Path) -> None:
+def test_a_recorder_without_a_session_or_of_another_one_is_ignored(short_plan: Plan, tmp_path: Path) -> None:
     plan = short_plan.with_ticks(100)
     bench = virtual.assemble(plan, reality.as_planned(plan), tmp_path / "a.mcap")
 
@@ -361,7 +365,7 @@ def test_a_recorder_of_no_session_or_another_disturbs_no_test(short_plan: Plan, 
     assert bench.slave.lab.recorded
 
 
-def test_a_recorder_that_comes_late_to_a_test_that_needs_none_is_asked_in(short_plan: Plan) -> None:
+def test_a_late_recorder_is_invited_to_a_test_that_does_not_require_one(short_plan: Plan) -> None:
     plan = without_recorder(short_plan)
     bench = running(plan, 1)
     sent: list[object] = []

@@ -1,4 +1,4 @@
-"""Two dampers on a building against a continuous state-space model that shares no code with the loops."""
+"""Two dampers on a building, compared with a continuous state-space model that shares no code with the loops."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def errors(interval: float) -> tuple[float, float]:
 
 
 @pytest.mark.slow
-def test_building_and_dampers_move_as_in_continuous_time_and_the_finer_the_nearer() -> None:
+def test_building_and_dampers_converge_to_the_continuous_model_with_the_interval() -> None:
     coarse, fine = errors(0.002), errors(0.0005)
     assert fine == pytest.approx((0.0, 0.0), abs=0.01)
     for rough, smooth in zip(coarse, fine, strict=True):

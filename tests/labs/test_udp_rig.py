@@ -1,4 +1,4 @@
-"""Tests whose rigs stand in other processes: the same bits as with the rig in the process, and the ramp to rest."""
+"""Tests with rigs in other processes give the same bits as with rigs in this process, and come to rest."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def played(plan: Plan, path: Path) -> tuple[virtual.VirtualTest, Run, Exception 
 
 @contextlib.contextmanager
 def apart(plan: Plan) -> Iterator[Plan]:
-    """The plan with every laboratory that it emulates in a server of its own."""
+    """The plan with each of its emulated laboratories in a server of its own."""
     reality = as_planned(plan)
     with contextlib.ExitStack() as stack:
         for role in plan.kinds:
@@ -127,7 +127,9 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return program
 
 
-def test_the_rig_in_c_gives_the_bits_of_the_rig_in_python(compiled: Path, tmp_path: Path) -> None:
+def test_the_example_rig_in_c_gives_the_same_bits_as_the_one_in_python(
+    compiled: Path, tmp_path: Path
+) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -144,7 +146,7 @@ def test_the_rig_in_c_gives_the_bits_of_the_rig_in_python(compiled: Path, tmp_pa
     same(in_process(tmp_path / "python.mcap"), found)
 
 
-def test_a_rig_that_falls_silent_is_held_for_and_then_the_test_comes_to_rest(
+def test_if_a_rig_falls_silent_the_test_holds_and_then_comes_to_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(udp, "FREE_NS", 100_000_000)
@@ -170,7 +172,7 @@ def test_a_rig_that_falls_silent_is_held_for_and_then_the_test_comes_to_rest(
     assert told["values"]["missed"] >= 4.0
 
 
-def test_a_rig_that_answers_again_in_time_lets_the_test_go_on(
+def test_if_a_rig_answers_again_in_time_the_test_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(udp, "FREE_NS", 100_000_000)
@@ -191,7 +193,7 @@ def test_a_rig_that_answers_again_in_time_lets_the_test_go_on(
     assert spoken == [0, 1, 3, 4, 5]
 
 
-def test_the_column_of_the_example_is_the_one_that_is_served(tmp_path: Path) -> None:
+def test_the_examples_column_equals_the_served_one(tmp_path: Path) -> None:
     with served(example.Column, example.CHANNELS) as address:
         plan = replace(example_plan(), master=LaboratoryTable(RigTable(address=address)))
         _, found, error = played(plan, tmp_path / "a.mcap")
@@ -199,7 +201,7 @@ def test_the_column_of_the_example_is_the_one_that_is_served(tmp_path: Path) -> 
     same(in_process(tmp_path / "b.mcap"), found)
 
 
-def test_of_a_rig_of_a_reality_nothing_is_told(tmp_path: Path) -> None:
+def test_a_recording_contains_nothing_about_a_rig_from_a_reality(tmp_path: Path) -> None:
     gate = Gate()
     plan = parse("[test]\nduration = 0.2\n", tmp_path)
     with served(example.Column, example.CHANNELS) as address:
@@ -211,7 +213,7 @@ def test_of_a_rig_of_a_reality_nothing_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("late", [False, True])
-def test_a_rig_whose_answers_are_too_slow_for_real_time_is_refused_by_name(late: bool) -> None:
+def test_a_rig_that_answers_too_slowly_for_real_time_is_refused_by_name(late: bool) -> None:
     plan = parse("", Path())
     terms = Terms("udp/9100", "[master.rig]", 0.002, 1, 0.5e-3, 1.0, 0.02, 5, paced=True)
     trips = [2e-4] * 40 + [1e-3 if late else 3e-4] * 10

@@ -1,4 +1,4 @@
-"""The loops of master and slave without disturbance: equal to the compiled rollout, and recorded whole."""
+"""The undisturbed loops of master and slave equal the compiled rollout and are recorded completely."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_the_loops_equal_the_rollout_with_every_correction(
 
 
 def replay_matches(path: Path) -> bool:
-    """Whether master's and table's computations come out again."""
+    """Asserts that the recorded computations of master and table are reproduced."""
     recording = read(path)
     matches = replay_master(recording, planned(recording)) | replay_slaves(recording, planned(recording))
     assert {"slave/table_command", "master/actuator_command"} <= matches.keys()
@@ -97,7 +97,9 @@ def test_another_seed_gives_other_noise(short_plan: Plan, recording: Run, tmp_pa
     )
 
 
-def test_every_tick_is_recorded_by_both_and_the_summary_says_so(short_plan: Plan, recording: Run) -> None:
+def test_every_tick_is_recorded_by_both_laboratories_and_counted_in_the_summary(
+    short_plan: Plan, recording: Run
+) -> None:
     for topic in ("master", "slave", "latency"):
         assert recording.sequences[topic].tolist() == list(range(short_plan.ticks))
     summary = recording.metadata["summary"]

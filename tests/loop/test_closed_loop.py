@@ -1,4 +1,4 @@
-"""The closed loop against the contract's figures, and against the theory of delayed feedback."""
+"""The closed loop, compared with the specified figures and with the theory of delayed feedback."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def without_damper(plan: Plan) -> Plan:
     return dataclasses.replace(plan, control=Control(amd=False))
 
 
-def test_the_default_tests_period_and_damping() -> None:
+def test_the_default_test_has_the_specified_period_and_damping() -> None:
     plan = Plan()
     values = (
         np.array(table) for table in (plan.structure.mass, plan.structure.stiffness, plan.structure.damping)
@@ -39,7 +39,7 @@ def test_the_default_tests_period_and_damping() -> None:
     assert found.damping_ratios[0] == pytest.approx(0.05, abs=1e-3)
 
 
-def test_the_default_test_has_the_contracts_peaks(default_plan: Plan) -> None:
+def test_the_default_test_has_the_specified_peaks(default_plan: Plan) -> None:
     found = signals(default_plan, simulate(default_plan, ground(default_plan)))
     assert largest(found["displacement"]) == pytest.approx(4.8e-3, rel=0.03)
     assert largest(found["damper_stroke"]) == pytest.approx(49e-3, rel=0.03)
@@ -67,7 +67,7 @@ def growth(plan: Plan, delay: float, seconds: float = 30.0) -> float:
     return math.log(late / early) / (0.75 * seconds * 2 / 3)
 
 
-def test_the_critical_delay_is_the_one_of_the_characteristic_equation(default_plan: Plan) -> None:
+def test_the_critical_delay_solves_the_characteristic_equation(default_plan: Plan) -> None:
     # (Mω² − (K − k))² + (Cω)² = k², k a quarter of the storey: 32.9 ms; the wait of a ramp and the
     # integrator's own tick are part of the loop's delay
     low, high = 0.025, 0.040
@@ -78,7 +78,7 @@ def test_the_critical_delay_is_the_one_of_the_characteristic_equation(default_pl
 
 
 @pytest.mark.parametrize(("delay", "damping"), [(0.004, 0.0437), (0.012, 0.0313), (0.016, 0.0251)])
-def test_each_millisecond_costs_the_damping_of_theory(
+def test_each_millisecond_of_delay_costs_the_damping_of_theory(
     default_plan: Plan, delay: float, damping: float
 ) -> None:
     rate = growth(default_plan, delay, seconds=8.0)
@@ -93,7 +93,7 @@ def test_the_uncompensated_test_diverges(default_plan: Plan) -> None:
     assert largest(found["displacement"][-2000:]) > largest(found["displacement"][8000:10000]) * 2.0
 
 
-def test_what_diverges_to_infinity_is_cut_there(default_plan: Plan) -> None:
+def test_a_rollout_that_diverges_to_infinity_is_cut_at_the_last_finite_tick(default_plan: Plan) -> None:
     plan = dataclasses.replace(
         with_table(default_plan, "actuator", gain=200.0), compensator=CompensatorTable("none", {})
     )
@@ -116,7 +116,7 @@ def test_the_damper_adds_three_points_of_damping(default_plan: Plan) -> None:
     assert decay(default_plan) - decay(without_damper(default_plan)) == pytest.approx(0.030, abs=0.002)
 
 
-def test_noise_comes_from_the_seed_alone(short_plan: Plan) -> None:
+def test_noise_depends_on_the_seed_only(short_plan: Plan) -> None:
     rows_ = ground(short_plan)
     first, again, other = (simulate(short_plan, rows_, seed=seed) for seed in (1, 1, 2))
     for name in COLUMN.channels.names:
@@ -124,7 +124,7 @@ def test_noise_comes_from_the_seed_alone(short_plan: Plan) -> None:
         assert not np.array_equal(first.master[name], other.master[name])
 
 
-def test_a_lost_message_is_bridged_by_the_one_before(short_plan: Plan) -> None:
+def test_the_previous_message_stands_in_for_a_lost_one(short_plan: Plan) -> None:
     nominal = on_time(short_plan.ticks)
     command, feedback = nominal.command.copy(), nominal.feedback.copy()
     command[500], feedback[700] = 499, 698
@@ -135,13 +135,13 @@ def test_a_lost_message_is_bridged_by_the_one_before(short_plan: Plan) -> None:
 
 
 @pytest.mark.parametrize("integrator", ["newmark_explicit", "central_difference", "cr", "kr_alpha"])
-def test_every_integrator_tells_the_same_story(default_plan: Plan, integrator: str) -> None:
+def test_every_integrator_gives_the_same_peak_displacement(default_plan: Plan, integrator: str) -> None:
     plan = with_table(default_plan, "structure", integrator=integrator, rho_infinity=1.0)
     found = signals(plan, simulate(plan, ground(plan)))
     assert largest(found["displacement"]) == pytest.approx(4.87e-3, rel=0.02)
 
 
-def test_several_storeys_specimen_and_damper_where_the_plan_says(default_plan: Plan) -> None:
+def test_specimen_and_damper_act_at_the_planned_storey_and_floor(default_plan: Plan) -> None:
     plan = with_table(
         default_plan, "structure", mass=[1.6e5] * 3, stiffness=[9e7, 8e7, 6e7], damping=[4e5, 4e5, 3e5]
     )
@@ -166,7 +166,7 @@ def test_numerical_columns_may_yield(default_plan: Plan) -> None:
     assert largest(found["numerical_force"]) == pytest.approx(limit, rel=1e-6)
 
 
-def test_the_rows_of_a_recording_are_the_signals(short_plan: Plan) -> None:
+def test_the_rows_of_a_recording_equal_the_signals_of_the_rollout(short_plan: Plan) -> None:
     rollout = simulate(short_plan, ground(short_plan), seed=1)
     found, written = signals(short_plan, rollout), list(rows(short_plan, rollout))
     assert len(written) == 2 * short_plan.ticks

@@ -1,4 +1,4 @@
-"""Combinations of laboratories share what is compiled: the types of a loop decide on it."""
+"""Combinations of laboratories share compiled code, because the types in their loops are the same."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def of(text: str) -> Plan:
 
 
 @pytest.mark.parametrize("name", ["two_storeys", "two_slaves", "device", "table alone", "table, column"])
-def test_a_new_combination_of_kinds_needs_no_new_loop(name: str) -> None:
+def test_a_new_combination_of_kinds_needs_no_new_compiled_loop(name: str) -> None:
     plan = {
         "device": lambda: plans.load(DEVICE),
         "table alone": lambda: of('[master]\nkind = "table"\n[slave]\nkind = "none"\n'),
@@ -50,13 +50,13 @@ def test_a_new_combination_of_kinds_needs_no_new_loop(name: str) -> None:
     assert types(loop_of(plan)) == types(known)
 
 
-def test_the_master_alone_moves_in_the_default_tests_loop() -> None:
+def test_a_master_without_slaves_uses_the_default_tests_compiled_loop() -> None:
     alone = loop_of(plans.load(cli.plan_path("single_site")))
     assert types(alone) == types(loop_of(Plan()))
     assert alone.traffic.used.shape[1] == 0
 
 
-def test_three_and_four_slaves_share_a_loop() -> None:
+def test_three_and_four_slaves_share_a_compiled_loop() -> None:
     three, four = (
         of(NONE + "".join(f'[slave.{name}]\nkind = "column"\n[slave.{name}.column]\n' for name in names))
         for names in ("abc", "abcd")

@@ -1,4 +1,4 @@
-"""The loop without slaves: the numbers of the whole closed loop, and those of equations written out anew."""
+"""The loop without slaves, compared with the whole closed loop and with equations written out separately."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def assert_same(found: Rollout, whole: Rollout) -> None:
 
 
 @pytest.mark.parametrize("seed", [None, 5])
-def test_it_is_the_closed_loop_to_the_last_bit(plan: Plan, seed: int | None) -> None:
+def test_the_loop_without_slaves_equals_the_closed_loop_to_the_last_bit(plan: Plan, seed: int | None) -> None:
     ground = ground_of(plan)
     found = alone(plan, ground, seed=seed)
     assert found.finite
@@ -74,7 +74,9 @@ def test_it_is_the_closed_loop_to_the_last_bit(plan: Plan, seed: int | None) -> 
         [("structure.p_delta", {"stiffness": -5e5}), ("sensor.column_force.lag", {"time_constant": 0.002})],
     ],
 )
-def test_it_is_so_with_effects_and_any_compensator(default_plan: Plan, laid: list[effects.Entry]) -> None:
+def test_the_loop_without_slaves_equals_the_closed_loop_with_effects_and_any_compensator(
+    default_plan: Plan, laid: list[effects.Entry]
+) -> None:
     base = with_table(with_test(default_plan, duration=3.0), "control", amd=False)
     system = effects.lay(System(base), laid)
     ground = ground_of(base)
@@ -82,7 +84,7 @@ def test_it_is_so_with_effects_and_any_compensator(default_plan: Plan, laid: lis
     assert_same(found, closed_loop.simulate(system.plan, ground, effects=system.effects, seed=1))
 
 
-def test_noise_that_is_given_is_that_of_the_seed(plan: Plan) -> None:
+def test_given_noise_equals_the_noise_of_the_seed(plan: Plan) -> None:
     ground = ground_of(plan)
     rows = site.errors(COLUMN, System(plan), plan.ticks, noise.lab_seed(9, noise.LAB_A))
     one, other = (
@@ -96,12 +98,12 @@ def test_noise_that_is_given_is_that_of_the_seed(plan: Plan) -> None:
         alone(plan, ground, noise={MASTER: rows[1:]})
 
 
-def test_a_plan_with_a_damper_is_refused(default_plan: Plan) -> None:
+def test_the_loop_without_slaves_refuses_a_plan_with_a_damper(default_plan: Plan) -> None:
     with pytest.raises(InputError, match="set amd"):
         alone(default_plan, ground_of(default_plan))
 
 
-def test_a_loop_that_diverges_ends_where_its_command_leaves_all_bounds(plan: Plan) -> None:
+def test_a_diverging_loop_ends_where_its_command_exceeds_all_bounds(plan: Plan) -> None:
     parameters = {"proportional": 40.0, "integral": 0.0, "derivative": 0.0}
     wild = replace(plan, compensator=CompensatorTable("pid", parameters))
     found = alone(wild, ground_of(wild), farthest=1e6)
@@ -112,7 +114,7 @@ def test_a_loop_that_diverges_ends_where_its_command_leaves_all_bounds(plan: Pla
     assert np.all(np.isfinite(found.master["displacement"]))
 
 
-def test_threads_get_what_one_gets(plan: Plan) -> None:
+def test_rollouts_in_threads_equal_those_in_one_thread(plan: Plan) -> None:
     ground = ground_of(plan)
     with ThreadPoolExecutor(2) as pool:
         found = list(pool.map(lambda seed: alone(plan, ground, seed=seed).master["column_force"], range(4)))
@@ -121,7 +123,7 @@ def test_threads_get_what_one_gets(plan: Plan) -> None:
 
 
 def written_out(plan: Plan, ground: Array, *, late: bool) -> Array:
-    """Floors of the test with an ideal actuator: four stages on the numerical part, the force held."""
+    """Floor displacements with an ideal actuator, by Runge-Kutta on the numerical part under a held force."""
     M, C, K = partition.numerical(plan)
     inverse, h, n = np.linalg.inv(M), plan.test.interval, plan.storeys
     whole = partition.matrices(plan).M @ np.ones(n)
@@ -148,7 +150,9 @@ def written_out(plan: Plan, ground: Array, *, late: bool) -> Array:
 
 
 @pytest.mark.parametrize("late", [False, True])
-def test_with_an_ideal_actuator_it_solves_the_equations_written_out(plan: Plan, late: bool) -> None:
+def test_with_an_ideal_actuator_the_loop_solves_the_separately_written_equations(
+    plan: Plan, late: bool
+) -> None:
     base = ideal(with_test(plan, duration=1.0))
     force = replace(base.compensator.force, unit_delay=late)
     base = replace(base, compensator=replace(base.compensator, force=force))
@@ -160,7 +164,7 @@ def test_with_an_ideal_actuator_it_solves_the_equations_written_out(plan: Plan, 
     )
 
 
-def test_with_an_ideal_actuator_the_test_is_the_whole_building(plan: Plan) -> None:
+def test_with_an_ideal_actuator_the_loop_equals_the_whole_building(plan: Plan) -> None:
     base = ideal(plan)
     ground = ground_of(base)
     expected = response(base, ground)
@@ -192,7 +196,7 @@ def tower(rows: bool, **column: Any) -> Plan:
 
 @pytest.mark.parametrize("integrator", ["newmark_explicit", "rk4", "kr_alpha"])
 @pytest.mark.parametrize("p_delta", [0.0, -1e6])
-def test_a_matrix_and_its_storeys_are_the_same_building(integrator: str, p_delta: float) -> None:
+def test_a_stiffness_matrix_and_its_storeys_give_the_same_building(integrator: str, p_delta: float) -> None:
     found = []
     for rows in (True, False):
         base = with_table(tower(rows), "structure", integrator=integrator)

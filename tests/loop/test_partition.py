@@ -1,4 +1,4 @@
-"""A building cut in two: its matrices, its critical delay, and the damping that a delay costs."""
+"""A partitioned building: its matrices, its critical delay, and the damping that a delay costs."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def case(plan: Plan, mass: float, ratio: float) -> Plan:
 
 
 @pytest.mark.parametrize(("mass", "ratio", "delay"), CASES)
-def test_the_critical_delay_is_that_of_the_published_equations(
+def test_the_critical_delay_agrees_with_the_published_equations(
     plan: Plan, mass: float, ratio: float, delay: float
 ) -> None:
     assert partition.critical_delay_of(case(plan, mass, ratio)) * 1e3 == pytest.approx(delay, rel=1e-3)
 
 
-def test_numerical_part_and_specimen_are_the_whole_building(plan: Plan) -> None:
+def test_numerical_part_and_specimen_add_up_to_the_whole_building(plan: Plan) -> None:
     whole, part, specimen = partition.matrices(plan), partition.numerical(plan), partition.felt(plan)
     outer = np.outer(partition.drift_direction(plan), partition.drift_direction(plan))
     for one, rest, left_out in zip(
@@ -54,7 +54,7 @@ def test_numerical_part_and_specimen_are_the_whole_building(plan: Plan) -> None:
     assert specimen == (1.19e6, 114.6, 29.13)
 
 
-def test_every_mode_has_the_damping_ratio(plan: Plan) -> None:
+def test_every_mode_has_the_planned_damping_ratio(plan: Plan) -> None:
     modes = shear_building.modes(*partition.matrices(case(plan, 1000.0, 0.05)))
     np.testing.assert_allclose(modes.damping_ratios, 0.05, rtol=1e-9)
     np.testing.assert_allclose(1.0 / modes.periods, [3.59, 16.0, 38.1], rtol=1e-2)
@@ -76,7 +76,7 @@ def test_a_matrix_of_a_shear_building_has_the_storeys_stiffness() -> None:
             np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
-def test_without_a_word_the_specimen_takes_over_its_share_of_the_columns(default_plan: Plan) -> None:
+def test_by_default_the_specimen_takes_over_its_share_of_the_columns(default_plan: Plan) -> None:
     plan = with_table(default_plan, "column", represents=3)
     assert partition.taken_over(plan) == Experimental(stiffness=0.75 * 25e6)
     assert partition.storey_stiffnesses(plan).tolist() == [0.25 * 25e6]
@@ -104,7 +104,7 @@ def test_a_dashpot_cannot_take_over_all_of_the_modal_damping(plan: Plan, storey:
         partition.numerical(taking(1.0 + 1e-6))
 
 
-def test_modal_damping_of_a_building_with_a_free_storey_has_a_limit_in_the_others() -> None:
+def test_the_damping_that_a_specimen_takes_over_is_limited_in_a_building_with_a_free_storey() -> None:
     text = "[structure]\nmass = [1e3, 1e3, 1e3]\nstiffness = [1e6, 0.0, 2e6]\ndamping_ratio = 0.1\n"
     text += "[structure.experimental]\nstiffness = 1e5\ndamping = {}\n[column]\nstorey = {}\n"
     alone = 2.0 * 0.1 * math.sqrt(1e6 * 1e3)  # of the first storey, which moves by itself
@@ -135,7 +135,7 @@ def decay(plan: Plan, amplitude: float, delay: float) -> float:
 
 
 @pytest.mark.parametrize(("amplitude", "delay"), [(1.0, 0.0005), (1.0, 0.002), (0.98, 0.001)])
-def test_what_a_path_costs_is_what_the_characteristic_equation_says(
+def test_the_damping_lost_by_a_path_agrees_with_the_characteristic_equation(
     plan: Plan, amplitude: float, delay: float
 ) -> None:
     heavy = replace(plan, column=replace(plan.column, mass=300.0, damping=2e3))
@@ -146,7 +146,7 @@ def test_what_a_path_costs_is_what_the_characteristic_equation_says(
     assert partition.damping_lost(heavy, path) == pytest.approx(lost, rel=0.05)
 
 
-def test_the_unit_delay_is_expected_in_the_path(plan: Plan) -> None:
+def test_the_expected_delay_of_a_path_includes_the_unit_delay(plan: Plan) -> None:
     force = replace(plan.compensator.force, unit_delay=False)
     prompt = replace(plan, compensator=replace(plan.compensator, force=force))
     late, early = partition.assess(plan), partition.assess(prompt)
@@ -156,7 +156,7 @@ def test_the_unit_delay_is_expected_in_the_path(plan: Plan) -> None:
     assert late.critical_delay == early.critical_delay
 
 
-def test_the_default_partition(default_plan: Plan) -> None:
+def test_the_default_partition_has_the_expected_delay_and_margin(default_plan: Plan) -> None:
     found = partition.assess(default_plan)
     assert found.frequency == pytest.approx(1.989, abs=1e-3)
     assert found.critical_delay == pytest.approx(0.0329, abs=1e-4)
@@ -166,19 +166,21 @@ def test_the_default_partition(default_plan: Plan) -> None:
 
 
 @pytest.mark.parametrize(("lead", "points"), [(0.0088, 1.9), (0.044, 0.0)])
-def test_the_cost_is_that_of_the_residual_delay(default_plan: Plan, lead: float, points: float) -> None:
+def test_the_damping_lost_follows_from_the_residual_delay(
+    default_plan: Plan, lead: float, points: float
+) -> None:
     plan = with_table(default_plan, "compensator", lead=lead)
     assert 100.0 * partition.assess(plan).damping_points == pytest.approx(points, abs=0.05)
 
 
-def test_a_specimen_without_stiffness_bears_any_delay(default_plan: Plan) -> None:
+def test_a_specimen_without_stiffness_tolerates_any_delay(default_plan: Plan) -> None:
     plan = with_table(default_plan, "column", stiffness=0.0)
     found = partition.assess(plan)
     assert math.isinf(found.critical_delay)
     assert "Stable at any delay; " in partition_text(plan, found)
 
 
-def test_two_storeys_diverge_beyond_their_critical_delay_only(default_plan: Plan) -> None:
+def test_two_storeys_diverge_only_beyond_their_critical_delay(default_plan: Plan) -> None:
     plan = with_table(
         default_plan, "structure", mass=[1.6e5, 1.6e5], stiffness=[50e6, 40e6], damping=[4e5, 3e5]
     )

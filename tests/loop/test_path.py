@@ -1,4 +1,4 @@
-"""The column's path: its delay follows the phase from frequency zero, and an unstable path is reported."""
+"""The actuator's path: its delay follows the phase from frequency zero, and an unstable path is reported."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def swept(delay: float, lead: float, proportional: float, frequency: float, inte
         (0.2, 0.03, 0.5),
     ],
 )
-def test_the_delay_is_that_of_the_closed_form_followed_from_frequency_zero(
+def test_the_delay_agrees_with_the_phase_of_the_closed_form_followed_from_frequency_zero(
     delay: float, lead: float, proportional: float
 ) -> None:
     plan = led(with_table(COARSE, "test", interval=0.005), delay, lead, proportional)
@@ -79,7 +79,7 @@ def test_the_delay_is_that_of_the_closed_form_followed_from_frequency_zero(
 @pytest.mark.parametrize(
     ("delay", "stable"), [(0.034, True), (0.036, True), (0.039, False), (0.05, False), (0.2, False)]
 )
-def test_an_actuator_unstable_under_its_compensator_is_told(
+def test_an_actuator_that_is_unstable_under_its_compensator_is_reported(
     default_plan: Plan, delay: float, stable: bool
 ) -> None:
     """By hand: `|P/(1 + jωT)| = 1` at 55 rad/s, where the phase leaves 38.4 ms for dead time and sampling."""
@@ -95,7 +95,7 @@ def test_an_actuator_unstable_under_its_compensator_is_told(
     some.sampled_from([0.0, 0.0, 0.3, 1.93]),
     some.integers(1, 3),
 )
-def test_a_longer_delay_is_never_expected_to_be_shorter(
+def test_the_expected_delay_does_not_decrease_with_the_actuators_delay(
     delays: list[float], lead: float, proportional: float, storeys: int
 ) -> None:
     n = storeys

@@ -1,4 +1,4 @@
-"""Risks that the nominal models show: margin of delay, peaks below the limits, several slaves."""
+"""Risks that follow from the nominal models: margin of delay, peaks below the limits, several slaves."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_the_critical_delay_of_a_storey_solves_its_characteristic_equation(
     assert critical_delay_of(plan) == pytest.approx(min(delays), rel=1e-9)
 
 
-def test_the_margin_of_delay_refuses_what_keeps_less(default_plan: Plan) -> None:
+def test_a_plan_with_less_than_the_required_delay_margin_is_refused(default_plan: Plan) -> None:
     found = assess(default_plan)
     expected = expected_delay(default_plan, found)
     assert expected == pytest.approx(0.0022, abs=1e-4)
@@ -71,12 +71,12 @@ def test_an_unstable_plan_is_refused_by_partition_and_peaks(default_plan: Plan) 
 
 
 @pytest.mark.parametrize("name", cli.SHIPPED)
-def test_every_plan_that_ships_passes(name: str) -> None:
+def test_every_shipped_plan_passes_the_preflight_checks(name: str) -> None:
     made = preflight.checks(plans.load(cli.plan_path(name)))
     assert [one.risk for one in made] == [None, None]
 
 
-def test_the_first_quantity_beyond_its_share_is_named(short_plan: Plan) -> None:
+def test_the_first_quantity_beyond_its_share_of_the_limit_is_named(short_plan: Plan) -> None:
     plan = with_table(short_plan, "limits", actuator_command=0.003, damper_stroke=0.01)
     found = simulated_peaks(plan)[2].risk
     assert found is not None
@@ -93,7 +93,7 @@ def test_the_first_quantity_beyond_its_share_is_named(short_plan: Plan) -> None:
     assert "raise damper_stroke in [limits]" in found.sentence
 
 
-def test_a_loop_that_diverges_is_unstable_and_no_limit_is_to_be_raised(default_plan: Plan) -> None:
+def test_a_diverging_loop_is_called_unstable_without_advice_to_raise_a_limit(default_plan: Plan) -> None:
     wild = {"proportional": 60.0, "integral": 0.0, "derivative": 0.0}
     plan = dataclasses.replace(default_plan, compensator=CompensatorTable("pid", wild))
     first, second = (one.risk for one in preflight.checks(plan))
@@ -105,7 +105,7 @@ def test_a_loop_that_diverges_is_unstable_and_no_limit_is_to_be_raised(default_p
     assert "raise" not in second.sentence
 
 
-def test_a_long_delay_is_unstable_and_no_peak_of_it_is_shown(default_plan: Plan) -> None:
+def test_a_long_delay_is_called_unstable_and_its_peaks_are_not_shown(default_plan: Plan) -> None:
     plan = with_table(default_plan, "actuator", delay=0.2)
     made = preflight.checks(plan)
     assert [one.risk.name for one in made if one.risk] == ["partition", "peaks"]
@@ -116,7 +116,7 @@ def test_a_long_delay_is_unstable_and_no_peak_of_it_is_shown(default_plan: Plan)
     assert "column_error exceeds 90% of its limit of 0.01 m at t = 1.492 s and keeps growing" in told
 
 
-def test_a_lead_is_only_advised_where_it_then_serves(default_plan: Plan) -> None:
+def test_a_lead_is_advised_only_where_it_removes_the_delay(default_plan: Plan) -> None:
     def advice(delay: float, lead: float) -> str:
         plan = with_table(default_plan, "actuator", delay=delay)
         plan = dataclasses.replace(plan, compensator=CompensatorTable("taylor", {"lead": lead, "order": 1.0}))
@@ -134,7 +134,7 @@ def test_an_unstable_control_of_the_damper_is_named(default_plan: Plan) -> None:
     assert "lower gain in [control], 3e+06 N·s/m" in found.sentence
 
 
-def test_limited_quantities_that_are_no_signals(short_plan: Plan) -> None:
+def test_limited_quantities_that_are_not_recorded_are_computed_from_the_signals(short_plan: Plan) -> None:
     n = 100
     t = np.linspace(0.0, (n - 1) * short_plan.test.interval, n)
     names = vars(short_plan.limits)
@@ -154,7 +154,7 @@ def test_limited_quantities_that_are_no_signals(short_plan: Plan) -> None:
     assert peaks(short_plan, {MASTER: columns, SLAVE: slave}).name == "column_error"
 
 
-def test_several_slaves_have_peaks_too() -> None:
+def test_the_peaks_of_several_slaves_are_checked() -> None:
     plan = plans.with_test(plans.load(cli.plan_path("two_dampers")), duration=3.0)
     assert "of their limits at most (" in simulated_peaks(plan)[2].text
     found = simulated_peaks(with_table(plan, "limits", damper_stroke=0.01))[2].risk

@@ -1,4 +1,4 @@
-"""A reality's effects in the real loops and rigs, against the compiled closed loop of the same system."""
+"""A reality's effects in the real loops and rigs, compared with the compiled closed loop of the same system."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def test_the_loops_with_effects_equal_the_compiled_rollout(lot: str, plan: Plan,
     assert [true_system(truth), *true_slaves(truth).values()] != [System(plan)] * 2
 
 
-def test_effects_and_parameters_of_a_reality_come_together(plan: Plan, tmp_path: Path) -> None:
+def test_effects_of_a_reality_apply_to_its_true_parameters(plan: Plan, tmp_path: Path) -> None:
     """Tables of a reality set the true parameters; its effects are laid over those."""
     truth = real(
         plan,
@@ -166,12 +166,12 @@ def test_effects_and_parameters_of_a_reality_come_together(plan: Plan, tmp_path:
     assert_equals_the_rollout(plan, truth, tmp_path / "both.mcap")
 
 
-def test_without_effects_the_system_is_the_plan(plan: Plan) -> None:
+def test_without_effects_the_system_equals_the_plan(plan: Plan) -> None:
     assert true_system(reality.as_planned(plan)) == System(plan)
     assert true_system(real(plan)) == System(plan)
 
 
-def test_effects_of_single_slaves_are_those_of_the_real_loops(tmp_path: Path) -> None:
+def test_effects_on_single_slaves_act_as_in_the_real_loops(tmp_path: Path) -> None:
     slaves = {
         "roof": {"damper": {"mass": 12.0, "floor": 2}, "control": {"gain": 5e4}},
         "cellar": {"damper": {"mass": 20.0, "force_scale": 10.0}, "control": {"gain": 1.2e4}},
@@ -199,7 +199,7 @@ def test_effects_of_single_slaves_are_those_of_the_real_loops(tmp_path: Path) ->
     assert run.columns["slave.roof"]["damper_force"].any()
 
 
-def test_effects_are_laid_in_the_order_given(plan: Plan) -> None:
+def test_effects_apply_in_the_given_order(plan: Plan) -> None:
     truth = real(
         plan,
         effect("actuator.backlash", width=1e-4),
@@ -246,7 +246,7 @@ def test_effects_on_a_plug_in_rig_are_refused_with_one_sentence(name: str, lab: 
     assert text.endswith(".")
 
 
-def test_a_plug_in_of_the_plan_counts_too(plan: Plan) -> None:
+def test_effects_are_refused_on_a_plug_in_rig_of_the_plan(plan: Plan) -> None:
     tables = plan.tables()
     tables["slave"] = {"rig": {"class": "somewhere.else:Lab"}}
     planned = from_tables(tables, plan.base)
@@ -254,7 +254,7 @@ def test_a_plug_in_of_the_plan_counts_too(plan: Plan) -> None:
         true_system(real(planned, effect("table.gain", factor=0.9)))
 
 
-def test_a_slave_without_a_name_of_the_masters_kind_is_its_twin() -> None:
+def test_an_unnamed_slave_of_the_masters_kind_shares_its_true_parameters_and_not_its_effects() -> None:
     planned = parse('[slave]\nkind = "column"\n', Path())
     found = effect("column.friction", force=900.0, laboratory=SLAVE)
     truth = real(planned, found, column={"stiffness": 13e6})
@@ -267,7 +267,7 @@ def test_a_slave_without_a_name_of_the_masters_kind_is_its_twin() -> None:
         real(planned, slave={"column": {"stiffness": 13e6}})
 
 
-def test_a_plug_in_of_a_named_slave_counts_too() -> None:
+def test_effects_are_refused_on_a_plug_in_rig_of_a_named_slave() -> None:
     tables = Plan().tables() | {"slave": {"east": {"rig": {"class": "somewhere.else:Lab"}}, "west": {}}}
     planned = from_tables(tables, Path())
     truth = real(planned, effect("table.gain", factor=0.9))
@@ -287,7 +287,7 @@ def test_a_plug_in_of_a_named_slave_counts_too() -> None:
         (effect("column.friction", force=math.nan), ("force", "nan")),
     ],
 )
-def test_what_the_catalogue_does_not_know_is_refused_with_a_plug_in_or_without(
+def test_an_unknown_effect_is_refused_with_and_without_a_plug_in_rig(
     entry: dict[str, Any], words: tuple[str, ...], plan: Plan
 ) -> None:
     with pytest.raises(RthsError) as caught:

@@ -1,4 +1,4 @@
-"""One part alone under a recorded input gives the readings that the whole test had."""
+"""One part alone under its recorded input gives the readings of the whole test."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def driven(command: Array, motor: Array | float = 0.0) -> Array:
 
 
 def alone(system: System, found: Rollout) -> tuple[Array, Array]:
-    """Both laboratories alone, behind the commands that they had in the loop."""
+    """Both laboratories alone, under the commands that they had in the loop."""
     slave = found.slaves["slave"]
     return (
         replay.laboratory(COLUMN, system, driven(found.master["actuator_command"])),
@@ -69,7 +69,7 @@ def assert_computed(system: System, found: Rollout) -> None:
 
 
 def strong(effect: Effect) -> dict[str, float]:
-    """The strongest size, the shape at its default."""
+    """Parameters with the strongest sizes and the default shapes."""
     item = next(item for item in effect.parameters if not item.shape)
     null = 0.0 if math.isinf(item.null) else item.null
     sizes = sorted(item.sizes, key=lambda size: abs(size - null))
@@ -77,7 +77,9 @@ def strong(effect: Effect) -> dict[str, float]:
 
 
 @EACH
-def test_each_laboratory_alone_reads_to_the_bit_what_it_read_in_the_loop(effect: Effect, plan: Plan) -> None:
+def test_each_laboratory_alone_gives_the_readings_of_the_loop_to_the_last_bit(
+    effect: Effect, plan: Plan
+) -> None:
     system = lay(System(plan), [(effect.name, strong(effect))])
     found = rollout(system)
     assert found.finite
@@ -90,13 +92,13 @@ def test_each_laboratory_alone_reads_to_the_bit_what_it_read_in_the_loop(effect:
 
 
 @EACH
-def test_the_building_alone_computes_what_it_computed_in_the_loop(effect: Effect, plan: Plan) -> None:
+def test_the_building_alone_computes_the_same_as_in_the_loop(effect: Effect, plan: Plan) -> None:
     system = lay(System(plan), [(effect.name, strong(effect))])
     found = rollout(system)
     assert_computed(system, found)
 
 
-def test_a_building_of_three_storeys_too(plan: Plan) -> None:
+def test_a_building_of_three_storeys_alone_computes_the_same_as_in_the_loop(plan: Plan) -> None:
     tables = {"mass": (1.6e5,) * 3, "stiffness": (9e7,) * 3, "damping": (4e5,) * 3}
     system = System(plan).moved("structure", **tables).moved("column", storey=2).moved("damper", floor=3)
     system = lay(system, [("structure.p_delta", {"stiffness": -1e6}), ("ground.time_shift", {"shift": 0.01})])
@@ -105,7 +107,7 @@ def test_a_building_of_three_storeys_too(plan: Plan) -> None:
 
 
 def rest(system: System, force: Array, displacement: Array) -> float:
-    """Rms of what the specimen's force has beyond that of the plan's linear model."""
+    """Rms of the difference between the specimen's force and that of the plan's linear model."""
     return float(np.std(force - system.plan.column.stiffness * displacement))
 
 
@@ -113,8 +115,8 @@ def rest(system: System, force: Array, displacement: Array) -> float:
     "name",
     [name for name in CATALOGUE if name.startswith("column.") and name.split(".")[1] not in IN_SHORT_STEPS],
 )
-def test_the_specimen_alone_feels_what_it_felt_in_the_loop(name: str, plan: Plan) -> None:
-    """Where only the deformation counts, to rounding."""
+def test_the_specimen_alone_has_the_same_force_as_in_the_loop(name: str, plan: Plan) -> None:
+    """The forces are equal to rounding where they depend on the deformation only."""
     system = lay(System(plan), [(name, strong(CATALOGUE[name]))])
     found = rollout(system)
     displacement, force = measured(found)
@@ -138,7 +140,7 @@ def test_the_specimen_alone_feels_what_it_felt_in_the_loop(name: str, plan: Plan
     ],
     ids=["viscous", "friction", "falling friction", "inertia"],
 )
-def test_the_specimen_alone_with_rates_from_the_ticks(
+def test_the_specimen_alone_with_rates_from_the_ticks_has_nearly_the_force_of_the_loop(
     effects: ColumnEffects, share: float, plan: Plan
 ) -> None:
     """Rates come from straight lines between the ticks: near what the servo loop's finer motion gave."""
@@ -149,7 +151,7 @@ def test_the_specimen_alone_with_rates_from_the_ticks(
     assert np.std(got - force) < share * rest(system, force, displacement)
 
 
-def test_the_plans_mass_and_dashpot_move_as_the_whole_motion_says(plan: Plan) -> None:
+def test_the_forces_of_mass_and_dashpot_follow_from_the_motion_of_the_whole_test(plan: Plan) -> None:
     """Against derivatives written out, to the error of central differences, through a load cell with a gain."""
     mass, damping, omega, dt = 2000.0, 5e4, 2.0 * math.pi * 3.0, plan.test.interval
     system = System(plan).moved("column", mass=mass, damping=damping)
@@ -162,8 +164,8 @@ def test_the_plans_mass_and_dashpot_move_as_the_whole_motion_says(plan: Plan) ->
     assert np.max(np.abs(got - wanted)[2:-2]) < 0.5 * (omega * dt) ** 2 * scale
 
 
-def test_a_column_with_a_dashpot_alone_feels_what_it_felt_in_the_loop(plan: Plan) -> None:
-    """The loop's own short steps beside differences over the ticks."""
+def test_a_column_with_a_dashpot_alone_has_nearly_the_same_force_as_in_the_loop(plan: Plan) -> None:
+    """The loop computes in short steps, the replay with differences over the ticks."""
     system = System(plan).moved("column", damping=5e4)
     found = rollout(system)
     displacement, force = measured(found)
@@ -173,7 +175,7 @@ def test_a_column_with_a_dashpot_alone_feels_what_it_felt_in_the_loop(plan: Plan
     assert path.delay == pytest.approx(0.0, abs=2e-6)
 
 
-def test_the_specimen_alone_reads_through_its_load_cell(plan: Plan) -> None:
+def test_the_specimen_alone_is_read_through_its_load_cell(plan: Plan) -> None:
     system = lay(
         System(plan),
         [
@@ -191,14 +193,14 @@ def test_the_specimen_alone_reads_through_its_load_cell(plan: Plan) -> None:
     assert np.max(np.abs(got - found.master["column_force"])) <= 100.0 + 1e-6
 
 
-def test_a_laboratory_that_begins_at_a_command_stays_there(plan: Plan) -> None:
+def test_a_laboratory_that_begins_at_a_constant_command_stays_there(plan: Plan) -> None:
     got = replay.laboratory(COLUMN, System(plan), driven(np.full(50, 2e-3)), 2e-3)
     assert np.allclose(got[:, 0], 2e-3, rtol=1e-12)
     assert np.allclose(got[1:, 1], 12.5e6 * 2e-3, rtol=1e-12)
 
 
 @pytest.mark.parametrize("tick", [0, 40])
-def test_a_damper_that_begins_anew_swings_freely_from_there(tick: int, plan: Plan) -> None:
+def test_a_damper_released_from_a_stroke_vibrates_freely(tick: int, plan: Plan) -> None:
     anew, none = np.array([[tick, 0.03, 0.1]]), np.zeros(800)
     got = replay.laboratory(TABLE, System(plan), driven(none), 0.0, anew)[:, 2]
     assert not got[:tick].any()

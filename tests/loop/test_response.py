@@ -1,4 +1,4 @@
-"""The response of the whole building against the exact one under a load that is held over each interval."""
+"""The response of the whole building, compared with the exact one under a load held over each interval."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def held(plan: Plan, ground: Array) -> Array:
     return np.array(rows)
 
 
-def test_runge_kuttas_is_the_exact_one_under_a_held_load(plan: Plan) -> None:
+def test_the_runge_kutta_response_is_exact_under_a_held_load(plan: Plan) -> None:
     ground = substructure.ground_rows(plan, substructure.motion(plan))
     expected = held(plan, ground)
     np.testing.assert_allclose(response(plan, ground), expected, atol=1e-6 * np.abs(expected).max(), rtol=0)

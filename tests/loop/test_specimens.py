@@ -31,7 +31,7 @@ def given(**tables: Any) -> Plan:
 
 
 def columns(*places: tuple[int, int, float], storeys: dict[str, Any] | None = None, own: bool = True) -> Plan:
-    """Columns of a storey, each standing for so many with that stiffness; the first is the master's if it has `own`."""
+    """Columns of a storey, each representing a number of columns of that stiffness; one may be the master's."""
     tables = [
         {"storey": storey, "represents": count, "stiffness": stiffness} for storey, count, stiffness in places
     ]
@@ -84,7 +84,7 @@ def apart(x: Array, y: Array) -> float:
     return float(np.max(np.abs(x - y)) / np.max(np.abs(y)))
 
 
-def test_two_columns_of_a_storey_are_one_that_stands_for_two() -> None:
+def test_two_columns_of_a_storey_equal_one_that_represents_two() -> None:
     two = columns((1, 1, 12.5e6), (1, 1, 12.5e6))
     one = columns((1, 2, 12.5e6))
     assert np.allclose(played(two), played(one), rtol=0.0, atol=1e-14)
@@ -92,14 +92,14 @@ def test_two_columns_of_a_storey_are_one_that_stands_for_two() -> None:
 
 
 @pytest.mark.parametrize("own", [True, False])
-def test_a_column_in_each_of_two_storeys_is_the_whole_frame(own: bool) -> None:
+def test_a_column_in_each_of_two_storeys_gives_the_response_of_the_whole_frame(own: bool) -> None:
     plan = columns((1, 1, 32.5e6), (2, 2, 25e6), storeys=TWO, own=own)
     found = played(plan)
     assert found.shape == (plan.ticks, 2)
     assert apart(found, frame(plan)) < 5e-3
 
 
-def test_no_specimen_leaves_the_building_whole() -> None:
+def test_without_a_specimen_the_numerical_part_is_the_whole_building() -> None:
     plan = given(master={"kind": "none"}, control={"amd": False}, structure=TWO)
     assert np.array_equal(partition.numerical(plan).K, partition.matrices(plan).K)
     assert apart(played_without(plan), frame(plan)) < 5e-3
@@ -121,7 +121,9 @@ def played_without(plan: Plan) -> Array:
         ("two_slaves", ["slave.columns"], "slave.columns"),
     ],
 )
-def test_every_path_of_the_plans_that_ship_keeps_its_margin(name: str, roles: list[str], late: str) -> None:
+def test_every_path_of_the_shipped_plans_keeps_its_delay_margin(
+    name: str, roles: list[str], late: str
+) -> None:
     plan = load(cli.plan_path(name))
     found = partition.assess(plan)
     assert (list(found.paths), found.role) == (roles, late)
@@ -129,12 +131,12 @@ def test_every_path_of_the_plans_that_ship_keeps_its_margin(name: str, roles: li
     assert preflight.partition_check(plan, found).risk is None
 
 
-def test_specimens_share_the_storey_and_leave_the_rest_to_the_numerical_columns() -> None:
+def test_specimens_take_their_shares_of_the_storey_and_the_numerical_columns_the_rest() -> None:
     plan = columns((1, 1, 32.5e6), (1, 2, 32.5e6), (2, 1, 25e6), storeys=TWO)
     assert partition.storey_stiffnesses(plan) == pytest.approx([0.25 * 65e6, 0.75 * 50e6])
 
 
-def test_the_critical_delay_of_one_storey_is_that_of_one_specimen_for_all() -> None:
+def test_several_specimens_in_one_storey_have_the_critical_delay_of_one_for_all() -> None:
     two, one = columns((1, 1, 12.5e6), (1, 1, 12.5e6)), columns((1, 2, 12.5e6))
     assert partition.critical_delay_of(two) == pytest.approx(partition.critical_delay_of(one), rel=1e-12)
 
@@ -149,7 +151,7 @@ def determinant(plan: Plan, felt: Array) -> Callable[[float, float], complex]:
     return at
 
 
-def test_the_critical_delay_of_two_storeys_makes_the_loop_vibrate_undamped() -> None:
+def test_at_the_critical_delay_of_two_storeys_the_loop_vibrates_undamped() -> None:
     plan = columns((1, 1, 32.5e6), (2, 1, 25e6), storeys=TWO)
     found = partition.critical_delay_of(plan)
     e = np.array([[1.0, 0.0], [-1.0, 1.0]])
@@ -172,13 +174,13 @@ def test_more_columns_than_a_storey_has_are_refused() -> None:
     columns((1, 3, 12.5e6), (2, 2, 12.5e6), storeys=TWO)
 
 
-def test_what_one_specimen_takes_over_is_not_said_of_two() -> None:
+def test_the_table_of_a_single_specimens_share_is_refused_with_two_specimens() -> None:
     structure = {"experimental": {"stiffness": 1e6}}
     with pytest.raises(PlanError, match=r"\[structure.experimental\] says .* but the plan has 2 columns"):
         columns((1, 1, 12.5e6), (1, 1, 12.5e6), storeys=structure)
     columns((1, 1, 12.5e6), storeys=structure)
 
 
-def test_the_storey_of_a_slaves_column_must_be_there() -> None:
+def test_the_storey_of_a_slaves_column_must_exist() -> None:
     with pytest.raises(PlanError, match=r"storey in \[slave.s0.column\] is 2, but the structure has 1"):
         columns((1, 1, 12.5e6), (2, 1, 12.5e6))

@@ -1,4 +1,4 @@
-"""Effects of the catalogue that differ by more than the signal that they falsify: readings share their code."""
+"""Effects of the catalogue that differ in code; effects on readings share their code over signals."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from laboratories.effects.reading import SIGNALS
 
 
 def _distinct() -> dict[str, Effect]:
-    """All effects on physics, and each kind of falsified reading on one signal, another one for each kind."""
+    """All physical effects, and each kind of falsified reading on one signal, a different one for each kind."""
     physics = {name: effect for name, effect in CATALOGUE.items() if not effect.signal}
     signals = list(SIGNALS)
     faults = dict.fromkeys(effect.fault for effect in CATALOGUE.values() if effect.signal)
@@ -20,5 +20,5 @@ DISTINCT = _distinct()
 
 
 def null_parameters(effect: Effect) -> dict[str, float]:
-    """The parameters with which an effect is not there."""
+    """The parameters with which an effect changes nothing."""
     return {item.name: item.null for item in effect.parameters}

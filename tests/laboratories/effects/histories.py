@@ -35,7 +35,7 @@ def run_a(
 
 
 def tones(ticks: int, seed: int = 1, size: float = 1.0) -> Array:
-    """A smooth random command, some `size` large."""
+    """A smooth random command with amplitudes of about `size`."""
     random = np.random.default_rng(seed)
     t = np.arange(1, ticks + 1) * DT
     frequency, phase = random.uniform(0.5, 5.0, size=4), random.uniform(0.0, 6.0, size=4)

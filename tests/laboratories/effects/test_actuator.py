@@ -56,8 +56,8 @@ def test_the_velocity_limit_is_the_slope_of_a_large_step() -> None:
 @given(width=st.floats(2e-5, 6e-4), compliance=st.sampled_from([0.0, 3e-9, 3e-8]))
 @settings(max_examples=15)
 @example(width=2e-4, compliance=3e-8)
-def test_the_dead_travel_at_a_reversal_is_the_play(width: float, compliance: float) -> None:
-    """Under load too: while the specimen stands still so does its force, and the piston moves the play."""
+def test_the_dead_travel_at_a_reversal_equals_the_play(width: float, compliance: float) -> None:
+    """This holds under load: the specimen and its force stand still while the piston moves through the play."""
     command = there_and_back(2e-3, 1e-3, 500)
     more = ActuatorEffects(backlash=width, compliance=compliance)
     got = run_a(command, DIRECT, actuator_effects=more)[:, 0]
@@ -69,14 +69,14 @@ def test_the_dead_travel_at_a_reversal_is_the_play(width: float, compliance: flo
 
 @given(compliance=st.floats(1e-9, 3e-8))
 @settings(max_examples=10)
-def test_the_compliant_piston_yields_statically(compliance: float) -> None:
+def test_a_compliant_piston_deflects_as_in_statics(compliance: float) -> None:
     got = run_a(np.full(400, 2e-3), actuator_effects=ActuatorEffects(compliance=compliance))
     displacement, force = got[-1]
     assert displacement == pytest.approx(2e-3 / (1.0 + compliance * K), rel=1e-5)
     assert force == pytest.approx(K * displacement)
 
 
-def test_the_compliant_piston_goes_with_the_force_of_a_yielding_specimen() -> None:
+def test_a_compliant_piston_follows_the_force_of_a_yielding_specimen() -> None:
     more, compliance = ColumnEffects(yield_displacement=1e-3, hardening=0.05), 1e-8
     command = tones(800, size=1.5e-3)
     servo = run_a(command)[:, 0]
@@ -115,7 +115,9 @@ STIFF_CONTACT = pytest.mark.xfail(strict=True, reason="c·F/presliding above 1 +
         pytest.param(1e-8, 3000.0, marks=STIFF_CONTACT),
     ],
 )
-def test_friction_behind_a_compliant_piston_is_its_balance(compliance: float, friction: float) -> None:
+def test_friction_behind_a_compliant_piston_satisfies_the_force_balance(
+    compliance: float, friction: float
+) -> None:
     t = np.arange(1, 751) * DT
     more = ActuatorEffects(compliance=compliance)
     rubbing = ColumnEffects(friction=friction, presliding=1e-5)
@@ -125,7 +127,7 @@ def test_friction_behind_a_compliant_piston_is_its_balance(compliance: float, fr
     assert np.max(np.abs(got - expected)) < 0.1 * compliance * friction
 
 
-def test_the_dead_band_stops_short_by_half_of_it_from_either_side() -> None:
+def test_with_a_dead_band_the_actuator_stops_short_by_half_of_it_on_either_side() -> None:
     for target in (3e-3, -3e-3):
         got = run_a(np.full(2000, target), actuator_effects=ActuatorEffects(deadband=4e-4))[:, 0]
         assert got[-1] == pytest.approx(target - math.copysign(2e-4, target), abs=1e-9)

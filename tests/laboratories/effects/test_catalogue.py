@@ -94,7 +94,7 @@ def strengths(effect: Effect) -> list[Parameter]:
 
 
 def strong(effect: Effect) -> dict[str, float]:
-    """The last size of what says how strong the effect is, the shape at its default."""
+    """Parameters with the last size of each strength and the default of each shape."""
     return null_parameters(effect) | {item.name: item.sizes[-1] for item in strengths(effect)}
 
 
@@ -107,13 +107,13 @@ def refusal(entries: list[effects.Entry]) -> str:
     return text
 
 
-def test_the_vocabulary_of_realities_and_reports_stays() -> None:
+def test_the_names_of_effects_and_parameters_are_unchanged() -> None:
     found = {name: {item.name: item.unit for item in CATALOGUE[name].parameters} for name in CATALOGUE}
     assert found.items() >= ROWS.items()  # effects may be added, none may be renamed
 
 
 @pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
-def test_each_effect_is_found_in_the_file_that_its_name_says(effect: Effect) -> None:
+def test_each_effect_is_defined_in_the_file_that_its_name_gives(effect: Effect) -> None:
     folder, _, stem = (f"sensor.{effect.fault}" if effect.signal else effect.name).partition(".")
     found = list(ROOM.rglob(f"effects/{folder}/{stem}.py"))
     assert len(found) == 1
@@ -132,14 +132,14 @@ def test_names_sites_and_kinds_agree(effect: Effect) -> None:
     assert strengths(effect)
 
 
-def test_effects_on_readings_of_one_fault_are_one_family() -> None:
+def test_effects_of_one_fault_on_different_readings_form_one_family() -> None:
     families = {effect.family for effect in CATALOGUE.values() if effect.signal}
     assert families == {f"sensor: {fault}" for fault in FAULTS}
     assert CATALOGUE["table.delay"].family == "table.delay"
 
 
 @EACH
-def test_what_is_said_of_a_search_refers_to_parameters_and_signals_that_are_there(effect: Effect) -> None:
+def test_hints_for_the_search_refer_to_existing_parameters_and_signals(effect: Effect) -> None:
     names = {item.name for item in effect.parameters}
     if effect.contact is not None:
         assert {effect.contact.place, effect.contact.stiffness} == names
@@ -159,7 +159,7 @@ def test_null_parameters_leave_the_system_as_it_was(effect: Effect) -> None:
 
 
 @EACH
-def test_a_shape_without_its_effect_leaves_no_trace(effect: Effect) -> None:
+def test_a_shape_parameter_of_an_absent_effect_changes_nothing(effect: Effect) -> None:
     for item in effect.parameters:
         if item.shape:
             for size in (item.least, *item.sizes, item.most):
@@ -167,7 +167,9 @@ def test_a_shape_without_its_effect_leaves_no_trace(effect: Effect) -> None:
 
 
 @EACH
-def test_null_after_the_effect_leaves_the_plan_and_takes_back_the_fields_that_it_sets(effect: Effect) -> None:
+def test_null_parameters_after_an_effect_keep_the_plan_and_reset_the_fields_that_it_sets(
+    effect: Effect,
+) -> None:
     before = lay(BASE, [(effect.name, strong(effect))])
     after = lay(before, [(effect.name, null_parameters(effect))])
     assert after.plan == before.plan
@@ -177,7 +179,7 @@ def test_null_after_the_effect_leaves_the_plan_and_takes_back_the_fields_that_it
 
 
 @EACH
-def test_every_size_is_within_bounds_and_changes_the_system(effect: Effect) -> None:
+def test_every_listed_size_is_within_bounds_and_changes_the_system(effect: Effect) -> None:
     for item in effect.parameters:
         assert item.least < item.most
         assert item.least <= item.null <= item.most or math.isinf(item.null)
@@ -201,7 +203,7 @@ def test_a_factor_has_sizes_on_both_sides_of_one(effect: Effect) -> None:
 
 
 @EACH
-def test_a_shape_changes_the_effect_it_belongs_to(effect: Effect) -> None:
+def test_a_shape_parameter_changes_its_effect(effect: Effect) -> None:
     for item in effect.parameters:
         if item.shape:
             seen = [lay(BASE, [(effect.name, strong(effect) | {item.name: size})]) for size in item.sizes]
@@ -209,13 +211,13 @@ def test_a_shape_changes_the_effect_it_belongs_to(effect: Effect) -> None:
 
 
 @EACH
-def test_what_need_not_be_given_is_at_its_default(effect: Effect) -> None:
+def test_an_optional_parameter_has_its_default(effect: Effect) -> None:
     given = {item.name: item.sizes[-1] for item in strengths(effect)}
     assert lay(BASE, [(effect.name, given)]) == lay(BASE, [(effect.name, strong(effect))])
 
 
 @EACH
-def test_bounds_and_null_are_allowed(effect: Effect) -> None:
+def test_the_bounds_and_the_null_value_of_a_parameter_are_accepted(effect: Effect) -> None:
     for item in effect.parameters:
         for value in (item.least, item.most, item.null):
             given = strong(effect) | {item.name: value}
@@ -224,7 +226,7 @@ def test_bounds_and_null_are_allowed(effect: Effect) -> None:
 
 
 @EACH
-def test_what_is_out_of_bounds_is_refused_with_the_range(effect: Effect) -> None:
+def test_a_parameter_out_of_bounds_is_refused_with_the_allowed_range(effect: Effect) -> None:
     for item in effect.parameters:
         wrong: tuple[Any, ...] = (
             item.least - 1.0,
@@ -255,19 +257,19 @@ def test_a_missing_or_unknown_parameter_is_refused(effect: Effect) -> None:
 
 
 @EACH
-def test_an_effect_can_be_sent_to_another_process(effect: Effect) -> None:
+def test_an_effect_can_be_pickled(effect: Effect) -> None:
     again = pickle.loads(pickle.dumps(effect))
     assert again.name == effect.name
     assert again.apply(BASE, **strong(effect)) == effect.apply(BASE, **strong(effect))
 
 
-def test_an_unknown_effect_is_refused_with_the_nearest() -> None:
+def test_an_unknown_effect_is_refused_with_the_nearest_name() -> None:
     assert refusal([("damper.fricton", {"force": 3.0})]) == (
         "Unknown effect 'damper.fricton': did you mean damper.friction?"
     )
 
 
-def test_sites_share_out_the_catalogue() -> None:
+def test_every_effect_of_the_catalogue_belongs_to_one_site_in_order() -> None:
     of_sites = [effect.name for site in SITES for effect in CATALOGUE.values() if effect.site == site]
     assert of_sites == list(CATALOGUE)
 
@@ -275,7 +277,7 @@ def test_sites_share_out_the_catalogue() -> None:
 @pytest.mark.parametrize(
     ("table", "name"), [("actuator", "delay"), ("table", "delay"), ("damper", "motor_time_constant")]
 )
-def test_what_is_added_never_makes_a_time_negative(table: str, name: str) -> None:
+def test_an_added_delay_or_lag_never_makes_a_time_negative(table: str, name: str) -> None:
     effect = "damper.motor_lag" if table == "damper" else f"{table}.delay"
     parameter = CATALOGUE[effect].parameters[0].name
     for value, more in ((-0.05, None), (0.01, 0.01)):
@@ -284,7 +286,7 @@ def test_what_is_added_never_makes_a_time_negative(table: str, name: str) -> Non
         assert getattr(getattr(system.plan, table), name) == (0.0 if more is None else nominal + more)
 
 
-def test_every_storey_and_parameters_at_their_limits_are_moved() -> None:
+def test_effects_reach_every_storey_and_leave_ideal_parameters_ideal() -> None:
     structure = Structure(mass=(1.0, 2.0), stiffness=(3.0, 4.0), damping=(5.0, 6.0))
     plan = Plan(structure=structure, table=ShakingTable(frequency=math.inf), damper=Damper(stiffness=0.0))
     system = System(plan)
@@ -295,7 +297,7 @@ def test_every_storey_and_parameters_at_their_limits_are_moved() -> None:
     assert lay(system, [("damper.stiffness", {"factor": 2})]).plan == plan
 
 
-def test_effects_on_two_readings_stand_side_by_side() -> None:
+def test_effects_on_two_readings_apply_independently() -> None:
     system = lay(
         BASE,
         [
@@ -313,7 +315,7 @@ def test_effects_on_two_readings_stand_side_by_side() -> None:
     assert BASE.effects.sensors == {}
 
 
-def test_the_sign_of_shift_and_gravity() -> None:
+def test_time_shift_and_p_delta_have_the_documented_signs() -> None:
     assert lay(BASE, [("ground.time_shift", {"shift": 0.1})]).effects.time_shift == 0.1
     assert lay(BASE, [("structure.p_delta", {"stiffness": -5e5})]).effects.p_delta == -5e5
     refusal([("structure.p_delta", {"stiffness": 5e5})])

@@ -47,7 +47,7 @@ def last_loop(path: Array, force: Array, frequency: float) -> float:
     amplitude=st.floats(0.5e-3, 4e-3),
     frequency=st.sampled_from([0.5, 1.0, 2.0, 4.0]),
 )
-def test_column_friction_loses_a_parallelogram(
+def test_column_friction_dissipates_a_parallelogram_per_cycle(
     friction: float, presliding: float, amplitude: float, frequency: float
 ) -> None:
     _, path = cycles(amplitude, frequency)
@@ -58,7 +58,7 @@ def test_column_friction_loses_a_parallelogram(
     assert np.max(np.abs(force - K * path)) == pytest.approx(friction, rel=1e-9)
 
 
-def test_column_friction_is_a_spring_before_it_slides() -> None:
+def test_column_friction_acts_as_a_spring_before_it_slides() -> None:
     effects = ColumnEffects(friction=900.0, presliding=20e-6)
     path = np.concatenate([np.linspace(0.0, 40e-6, 41), np.linspace(40e-6, -10e-6, 51)[1:]])
     got = specimen_under(path, effects) - K * path
@@ -68,7 +68,7 @@ def test_column_friction_is_a_spring_before_it_slides() -> None:
     assert np.allclose(got[41:], 900.0 * np.maximum(1.0 - (40e-6 - down) / 20e-6, -1.0), atol=1e-6)
 
 
-def test_column_friction_that_falls_off_with_speed() -> None:
+def test_column_friction_that_falls_with_speed_follows_its_law() -> None:
     effects = ColumnEffects(friction=900.0, presliding=1e-6, friction_velocity=0.01)
     for speed in (0.001, 0.01, 0.05):
         path = np.arange(1, 400) * speed * SHORT
@@ -77,7 +77,7 @@ def test_column_friction_that_falls_off_with_speed() -> None:
 
 
 @pytest.mark.parametrize("hold", [1, 50])
-def test_column_friction_stays_while_the_specimen_does_not_move(hold: int) -> None:
+def test_column_friction_stays_constant_while_the_specimen_rests(hold: int) -> None:
     path = np.concatenate([np.linspace(0.0, 1e-3, 100), np.full(hold, 1e-3)])
     got = specimen_under(path, ColumnEffects(friction=900.0)) - K * path
     assert np.allclose(got[10:], 900.0, rtol=1e-6)
@@ -89,7 +89,9 @@ def test_column_friction_stays_while_the_specimen_does_not_move(hold: int) -> No
     amplitude=st.floats(1e-4, 4e-3),
     frequency=st.sampled_from([1.0, 2.0, 5.0]),
 )
-def test_the_viscous_column_loses_an_ellipse(coefficient: float, amplitude: float, frequency: float) -> None:
+def test_a_viscous_column_dissipates_an_ellipse_per_cycle(
+    coefficient: float, amplitude: float, frequency: float
+) -> None:
     _, path = cycles(amplitude, frequency)
     force = specimen_under(path, ColumnEffects(viscous=coefficient))
     expected = math.pi * coefficient * 2.0 * math.pi * frequency * amplitude**2
@@ -97,7 +99,7 @@ def test_the_viscous_column_loses_an_ellipse(coefficient: float, amplitude: floa
 
 
 @pytest.mark.parametrize("frequency", [1.0, 2.0, 5.0])
-def test_the_fixtures_inertia_takes_from_the_stiffness(frequency: float) -> None:
+def test_the_fixtures_inertia_reduces_the_dynamic_stiffness(frequency: float) -> None:
     t, path = cycles(2e-3, frequency)
     got = specimen_under(path, ColumnEffects(inertia=600.0)) - K * path
     omega, last = 2.0 * np.pi * frequency, slice(-round(1.0 / (frequency * SHORT)), None)
@@ -107,7 +109,7 @@ def test_the_fixtures_inertia_takes_from_the_stiffness(frequency: float) -> None
     assert abs(across) < 0.01 * abs(in_phase)
 
 
-def test_inertia_and_viscosity_in_the_laboratory_behind_its_actuator() -> None:
+def test_inertia_and_viscosity_act_on_the_load_cell_reading_behind_the_actuator() -> None:
     """The same two, as the load cell reads them at the ticks while the servo loop moves the specimen.
 
     There T·ẏ = u − y and T·ÿ = u̇ − ẏ, with u̇ the slope of the ramp that just ended.
@@ -156,7 +158,7 @@ def test_the_yielding_column_is_bilinear_with_a_large_exponent() -> None:
     assert np.max(force) == pytest.approx(K * (limit + hardening * (amplitude - limit)), rel=0.01)
 
 
-def test_the_degrading_column_remembers_its_largest_deformation() -> None:
+def test_a_degrading_columns_stiffness_depends_on_its_largest_deformation() -> None:
     path = np.concatenate(
         [np.linspace(0, 1e-3, 50), np.linspace(1e-3, -3e-3, 90), np.linspace(-3e-3, 2e-3, 90)]
     )
@@ -171,7 +173,7 @@ def test_the_degrading_column_remembers_its_largest_deformation() -> None:
     width=st.floats(3e-4, 3e-3),
     where=st.floats(0, 5e-3),
 )
-def test_the_pinched_column_is_its_formula_and_odd(
+def test_a_pinched_column_follows_its_formula_and_is_odd(
     factor: float, hardening: float, width: float, where: float
 ) -> None:
     more = ColumnEffects(pinching=factor, pinching_hardening=hardening, pinching_width=width)
@@ -183,7 +185,7 @@ def test_the_pinched_column_is_its_formula_and_odd(
 
 
 @given(gap=st.floats(2e-5, 1e-3), where=st.floats(-3e-3, 3e-3))
-def test_the_loose_column_feels_nothing_inside_its_gap(gap: float, where: float) -> None:
+def test_a_loose_column_has_no_force_inside_its_gap(gap: float, where: float) -> None:
     (got,) = specimen_under(np.array([where]), ColumnEffects(slip=gap))
     outside = abs(where) - 0.5 * gap
     assert got == pytest.approx(math.copysign(K * max(outside, 0.0), where), abs=1e-6)
@@ -195,7 +197,7 @@ def through(*turns: float, steps: int = 400) -> Array:
     return np.concatenate([[0.0], *parts])
 
 
-def test_the_gap_goes_along_with_a_specimen_that_rests_elsewhere() -> None:
+def test_a_gap_around_the_rest_position_moves_with_a_yielded_specimen() -> None:
     gap, limit = 0.4e-3, 1e-3
     more = ColumnEffects(slip=gap, slip_law=1.0, yield_displacement=limit, hardening=0.0, law=1.0)
     path = through(3e-3, 0.0)
@@ -209,13 +211,13 @@ def test_the_gap_goes_along_with_a_specimen_that_rests_elsewhere() -> None:
     assert np.allclose(got[400:], K * (left + np.maximum(met, -limit)), atol=0.01 * K * limit)
 
 
-def test_a_gap_where_an_elastic_specimen_rests_is_the_one_around_the_origin() -> None:
+def test_with_an_elastic_specimen_a_gap_around_its_rest_position_acts_like_one_around_the_origin() -> None:
     path = through(2e-3, -1.5e-3, 1e-3, -0.1e-3, 0.5e-3)
     resting = specimen_under(path, ColumnEffects(slip=0.6e-3, slip_law=1.0))
     assert np.allclose(resting, specimen_under(path, ColumnEffects(slip=0.6e-3)), atol=0.01 * K * 1e-3)
 
 
-def test_a_specimen_that_is_held_stays_behind_by_half_the_gap() -> None:
+def test_a_specimen_held_in_a_gap_lags_by_half_the_gap() -> None:
     gap, top = 0.4e-3, 2e-3
     path = through(top, -top, top)
     got = specimen_under(path, ColumnEffects(slip=gap, slip_law=2.0))
@@ -226,14 +228,16 @@ def test_a_specimen_that_is_held_stays_behind_by_half_the_gap() -> None:
 
 
 @given(gap=st.floats(2e-5, 1e-3), share=st.floats(0.05, 1.0), where=st.floats(-3e-3, 3e-3))
-def test_a_part_beside_the_gap_carries_on(gap: float, share: float, where: float) -> None:
+def test_a_part_in_parallel_with_the_gap_carries_force_inside_it(
+    gap: float, share: float, where: float
+) -> None:
     (got,) = specimen_under(np.array([where]), ColumnEffects(slip=gap, slip_law=3.0, slip_share=share))
     inside = min(max(where, -0.5 * gap), 0.5 * gap)
     assert got == pytest.approx(K * (where - share * inside), abs=1e-6)
 
 
 @given(share=st.floats(-0.5, 2.0), bend=st.floats(1e-4, 3e-3), where=st.floats(-4e-3, 4e-3))
-def test_the_hardening_column_is_its_formulas(share: float, bend: float, where: float) -> None:
+def test_a_hardening_column_follows_its_formulas(share: float, bend: float, where: float) -> None:
     cubic, bent = (
         specimen_under(
             np.array([where]), ColumnEffects(stiffening=share, stiffening_law=law, stiffening_bend=bend)
@@ -246,7 +250,7 @@ def test_the_hardening_column_is_its_formulas(share: float, bend: float, where: 
 
 
 @pytest.mark.parametrize("where", [-3e-3, -1.5e-3, 5e-4, 2.5e-3])
-def test_hardening_with_two_bends_is_three_lines(where: float) -> None:
+def test_hardening_with_two_bends_consists_of_three_lines(where: float) -> None:
     more = ColumnEffects(
         stiffening=-0.6,
         stiffening_law=2.0,
@@ -259,7 +263,7 @@ def test_hardening_with_two_bends_is_three_lines(where: float) -> None:
     assert specimen_under(np.array([where]), more)[0] == pytest.approx(expected, abs=1e-6)
 
 
-def test_the_self_centring_column_loses_two_flags_and_rests_at_the_origin() -> None:
+def test_a_self_centring_column_dissipates_two_flags_and_returns_to_the_origin() -> None:
     place, loop, amplitude = 1e-3, 0.6, 3e-3
     _, path = cycles(amplitude, 1.0)
     more = ColumnEffects(centring=place, centring_hardening=0.1, centring_loop=loop)
@@ -272,7 +276,7 @@ def test_the_self_centring_column_loses_two_flags_and_rests_at_the_origin() -> N
 
 
 @pytest.mark.parametrize("name", ["trilinear", "pinched", "pinched_by_peak", "pinched_by_rest"])
-def test_further_laws_of_yielding_are_their_models(name: str) -> None:
+def test_the_further_laws_of_yielding_equal_the_specimen_models_of_that_name(name: str) -> None:
     path = through(2e-3, -3e-3, 2.5e-3, -1e-3)
     shapes = {"hardening": 0.03, "first_bend": 0.4, "second_stiffness": 0.6}
     corner = {"pinch_force": 0.3, "pinch_displacement": 0.6, "unloading": 0.2, "damage": 0.05}
@@ -284,7 +288,7 @@ def test_further_laws_of_yielding_are_their_models(name: str) -> None:
     assert np.allclose(got, expected, rtol=1e-9, atol=1e-6)
 
 
-def test_friction_by_direction_and_speed() -> None:
+def test_column_friction_depends_on_direction_and_speed() -> None:
     more = ColumnEffects(friction=900.0, presliding=1e-6, friction_asymmetry=0.2)
     path = through(2e-3, -2e-3)
     got = specimen_under(path, more) - K * path
@@ -297,7 +301,7 @@ def test_friction_by_direction_and_speed() -> None:
         assert rubbing == pytest.approx(900.0 * (1.0 - 0.3 * (1.0 - math.exp(-speed / 0.02))), rel=1e-6)
 
 
-def test_effects_of_the_column_come_on_top_of_any_model() -> None:
+def test_effects_of_the_column_are_added_to_any_specimen_model() -> None:
     bilinear = Column(
         model="bilinear", stiffness=K, parameters={"yield_displacement": 1e-3, "hardening": 0.1}
     )
@@ -309,7 +313,7 @@ def test_effects_of_the_column_come_on_top_of_any_model() -> None:
     assert np.allclose(more, plain + 4e4 * speed, rtol=1e-9, atol=1e-6)
 
 
-def test_friction_work_by_quadrature_agrees_with_the_loop_under_falling_friction() -> None:
+def test_the_work_of_falling_friction_by_quadrature_agrees_with_the_loop() -> None:
     """∮ F·tanh(|v|/v0) |dx| of a sine by quadrature, against the specimen's loop."""
     amplitude, frequency, force, fall = 2e-3, 1.0, 900.0, 0.005
     omega = 2.0 * math.pi * frequency

@@ -55,7 +55,7 @@ def peaks(stroke: Array) -> Array:
 
 @given(friction=st.floats(0.3, 3.0), spring=st.sampled_from([56.8, 500.0, 2000.0]))
 @settings(max_examples=12)
-def test_the_rubbing_damper_decays_on_a_straight_line_and_rests(friction: float, spring: float) -> None:
+def test_a_damper_with_friction_decays_linearly_and_comes_to_rest(friction: float, spring: float) -> None:
     damper = Damper(mass=16.0, stiffness=spring, damping=0.0)
     zone = friction / spring
     start = 9.3 * zone
@@ -73,7 +73,7 @@ def test_the_rubbing_damper_decays_on_a_straight_line_and_rests(friction: float,
 
 
 @pytest.mark.parametrize("push", [0.9, -0.9, 1.1])
-def test_the_rubbing_damper_sticks_below_its_friction(push: float) -> None:
+def test_a_damper_sticks_below_its_friction(push: float) -> None:
     got = run_b(np.zeros(500), np.full(500, push * 3.0), damper_effects=DamperEffects(friction=3.0))
     if abs(push) < 1.0:
         assert np.max(np.abs(got[:, STROKE])) < 1e-8
@@ -83,7 +83,7 @@ def test_the_rubbing_damper_sticks_below_its_friction(push: float) -> None:
         assert got[-1, STROKE] > 1e-3
 
 
-def test_the_rubbing_damper_loses_its_force_times_the_way() -> None:
+def test_a_dampers_friction_dissipates_force_times_distance() -> None:
     frequency, friction = 2.0, 3.0
     t = np.arange(1, 3001) * DT
     motor = 60.0 * np.sin(2.0 * np.pi * frequency * t)
@@ -101,7 +101,7 @@ def test_the_rubbing_damper_loses_its_force_times_the_way() -> None:
     assert np.max(np.abs(16.0 * np.gradient(rate, DT)[5:-5] + force[5:-5])) < 0.1 * np.max(np.abs(force))
 
 
-def test_friction_that_falls_off_slowly_damps_like_a_dashpot_at_small_speed() -> None:
+def test_smoothed_friction_acts_like_a_dashpot_at_small_speed() -> None:
     damper = Damper(mass=16.0, stiffness=500.0, damping=0.0)
     more = DamperEffects(friction=2.0, friction_velocity=0.05)
     start, period = 1e-4, 2.0 * math.pi * math.sqrt(16.0 / 500.0)
@@ -122,7 +122,7 @@ def test_the_motors_force_is_limited(limit: float) -> None:
     assert np.allclose(got[:, FORCE], -np.clip(1.07 * motor, -limit, limit), atol=1e-12)
 
 
-def test_the_motors_lag_is_of_first_order() -> None:
+def test_the_motors_lag_is_first_order() -> None:
     plan = lay(System(Plan()), [("damper.motor_lag", {"time_constant": 0.008})]).plan
     damper = dataclasses.replace(plan.damper, stiffness=0.0, damping=0.0)
     got = run_b(np.zeros(60), np.full(60, 30.0), damper=damper)[:, FORCE]
@@ -132,7 +132,7 @@ def test_the_motors_lag_is_of_first_order() -> None:
 
 @given(force=st.floats(-50.0, 50.0))
 @settings(max_examples=10)
-def test_a_constant_force_moves_the_damper_by_its_statics(force: float) -> None:
+def test_a_constant_force_deflects_the_damper_as_in_statics(force: float) -> None:
     damper = Damper(damping=60.0)
     got = run_b(np.zeros(6000), damper=damper, damper_effects=DamperEffects(offset=force))
     assert got[-1, STROKE] == pytest.approx(force / 56.8, rel=1e-4, abs=1e-9)
@@ -151,7 +151,7 @@ FREE = Damper(mass=16.0, stiffness=0.0, damping=0.0)
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 @pytest.mark.parametrize(("stiffness", "tolerance"), [(500.0, 0.005), (2000.0, 0.005), (20000.0, 0.016)])
-def test_the_end_stop_is_an_elastic_spring(stiffness: float, tolerance: float, direction: float) -> None:
+def test_the_end_stop_acts_as_an_elastic_spring(stiffness: float, tolerance: float, direction: float) -> None:
     stop, speed = 0.02, 0.5 * direction
     more = DamperEffects(stop_stroke=stop, stop_stiffness=stiffness)
     got = released(FREE, more, 0.08 + math.pi * math.sqrt(16.0 / stiffness), rate=speed)
@@ -173,7 +173,7 @@ def test_the_end_stop_is_an_elastic_spring(stiffness: float, tolerance: float, d
     "stiffness",
     [2000.0, 20000.0],
 )
-def test_a_damper_that_bounces_solves_its_equation(stiffness: float) -> None:
+def test_a_damper_that_hits_its_end_stop_solves_its_equation(stiffness: float) -> None:
     stop, start = 0.03, 0.05
     damper = Damper(mass=16.0, stiffness=56.8, damping=6.0)
     more = DamperEffects(stop_stroke=stop, stop_stiffness=stiffness)
@@ -209,10 +209,10 @@ ALL_DAMPER = DamperEffects(
     ],
     ids=["friction", "stop", "motor", "everything"],
 )
-def test_the_force_balances_the_motion_with_every_effect(
+def test_the_dampers_force_balances_its_motion_with_every_effect(
     table_effects: TableEffects, damper_effects: DamperEffects
 ) -> None:
-    """m·Δ(ṡ + ẏ) = −∫F dt over any stretch: what the damper gains in momentum the table's reading says."""
+    """m·Δ(ṡ + ẏ) = −∫F dt over any stretch: what the damper gains in momentum the table's reading gives."""
     t = np.arange(1, 8001) * SHORT
     command, motor = 0.01 * np.sin(12.0 * t), 60.0 * np.sin(12.5 * t + 1.0)
     table = ShakingTable(delay=0.0)
@@ -225,7 +225,7 @@ def test_the_force_balances_the_motion_with_every_effect(
     assert np.max(np.abs(error)) < 0.005 * np.max(np.abs(momentum))
 
 
-def test_the_platform_s_reading_of_acceleration_is_its_velocitys_slope() -> None:
+def test_the_platforms_acceleration_reading_is_the_derivative_of_its_velocity() -> None:
     t = np.arange(1, 4001) * SHORT
     command = 0.01 * np.sin(12.0 * t)
     got = run_b(

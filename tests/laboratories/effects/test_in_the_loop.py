@@ -64,7 +64,7 @@ def rigs(system: System) -> list[tuple[float, ...]]:
     return result
 
 
-def test_an_effect_in_the_rigs_shows_only_at_its_laboratory(plan: Plan) -> None:
+def test_an_effect_changes_only_the_readings_of_its_own_laboratory(plan: Plan) -> None:
     before = np.array(rigs(System(plan)))
     for effect in CATALOGUE.values():
         changed = lay(System(plan), [(effect.name, {strength(effect).name: ordered(effect)[-1]})])
@@ -85,7 +85,7 @@ def ordered(effect: Effect) -> list[float]:
 
 
 @EACH
-def test_a_millionth_of_the_weakest_size_is_a_thousandth_of_its_change(
+def test_a_millionth_of_an_effects_weakest_size_changes_at_most_a_thousandth_as_much(
     effect: Effect, plan: Plan, nominal: Rollout
 ) -> None:
     item = strength(effect)
@@ -108,7 +108,7 @@ def test_a_millionth_of_the_weakest_size_is_a_thousandth_of_its_change(
     assert np.all(slight <= share * weak + 1e-9 * scale)
 
 
-def test_gravity_on_the_drift_is_a_change_of_stiffness(plan: Plan) -> None:
+def test_p_delta_equals_a_change_of_stiffness(plan: Plan) -> None:
     gravity = -1.5e6
     leaning = lay(System(plan), [("structure.p_delta", {"stiffness": gravity})])
     # three of four columns are numerical, so their share of the storey's stiffness changes by all of it
@@ -118,7 +118,7 @@ def test_gravity_on_the_drift_is_a_change_of_stiffness(plan: Plan) -> None:
     assert not np.allclose(left, everything(rollout(System(plan), None)), rtol=1e-3)
 
 
-def test_gravity_acts_in_every_storey(plan: Plan) -> None:
+def test_p_delta_acts_in_every_storey(plan: Plan) -> None:
     tables = {"mass": (1.6e5,) * 3, "stiffness": (9e7, 8e7, 6e7), "damping": (4e5,) * 3}
     tall = System(plan).moved("structure", **tables).moved("column", storey=2, stiffness=40e6)
     leaning = lay(tall, [("structure.p_delta", {"stiffness": -4e6})])
@@ -128,7 +128,7 @@ def test_gravity_acts_in_every_storey(plan: Plan) -> None:
 
 
 @pytest.mark.parametrize("ticks", [5, -5, 25])
-def test_a_motion_that_comes_whole_ticks_later_moves_everything_alike(plan: Plan, ticks: int) -> None:
+def test_a_ground_motion_shifted_by_whole_ticks_shifts_every_response(plan: Plan, ticks: int) -> None:
     later = lay(System(plan), [("ground.time_shift", {"shift": ticks * DT})])
     shifted, plain = rollout(later, None), rollout(System(plan), None)
     motion = substructure.ground_rows(later.plan, substructure.motion(later.plan), ticks * DT)
@@ -145,7 +145,7 @@ def test_a_motion_that_comes_whole_ticks_later_moves_everything_alike(plan: Plan
 
 
 @given(shift=st.floats(-30.0, 30.0))
-def test_a_shifted_ground_moves_on_straight_lines(shift: float) -> None:
+def test_a_shifted_ground_motion_is_interpolated_linearly(shift: float) -> None:
     t = np.arange(200.0)
     rows = np.stack([np.sin(0.05 * t), t])
     found = substructure.shifted(rows, shift)

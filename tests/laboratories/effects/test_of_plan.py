@@ -56,24 +56,24 @@ def own(tmp_path: Path) -> Plan:
     return from_tables({"slave": {"kind": "spring.py:Spring"}}, tmp_path)
 
 
-def test_the_default_test_has_all_that_ships() -> None:
+def test_the_default_test_has_all_shipped_effects() -> None:
     assert list(effects.of_plan(Plan())) == list(effects.CATALOGUE)
 
 
-def test_a_test_has_the_effects_of_its_kinds_alone() -> None:
+def test_a_test_has_only_the_effects_of_its_kinds() -> None:
     assert not any(site in ("table", "damper") for site in of_plan(TWO))
     assert "link" not in of_plan(SINGLE)
     assert {item.site for item in effects.of_plan(SINGLE).values()} == set(of_plan(SINGLE))
 
 
-def test_a_kind_of_a_users_brings_its_own_and_those_of_its_readings(own: Plan) -> None:
+def test_a_users_kind_adds_its_own_effects_and_those_of_its_readings(own: Plan) -> None:
     found = effects.of_plan(own)
     assert {"device.crack", "sensor.spring_force.gain", "actuator.delay", "link.loss"} <= found.keys()
     assert "table.delay" not in found
     assert found["sensor.spring_force.noise"].parameters[0].sizes[0] == pytest.approx(3.5)
 
 
-def test_an_effect_on_a_device_reaches_it(own: Plan) -> None:
+def test_an_effect_on_a_users_device_changes_it(own: Plan) -> None:
     slave = true_slaves(real(own, {"name": "device.crack", "share": 0.2}))["slave"]
     assert slave.effects.device == {"crack": 0.2}
 
@@ -82,7 +82,7 @@ def test_an_effect_on_a_device_reaches_it(own: Plan) -> None:
     ("given", "master", "slave"),
     [({}, 0.8, 0.8), ({"laboratory": "master"}, 0.8, 1.0), ({"laboratory": "slave"}, 1.0, 0.8)],
 )
-def test_an_effect_holds_for_every_laboratory_that_has_its_place_or_for_one(
+def test_an_effect_applies_to_every_laboratory_with_its_site_or_to_the_named_one(
     given: dict[str, str], master: float, slave: float
 ) -> None:
     truth = real(TWO, {"name": "actuator.gain", "factor": 0.8, **given})
@@ -90,7 +90,7 @@ def test_an_effect_holds_for_every_laboratory_that_has_its_place_or_for_one(
     assert true_slaves(truth)["slave"].plan.actuator.gain == slave * TWO.actuator.gain
 
 
-def test_a_named_slave_has_the_effect_that_names_it() -> None:
+def test_only_the_named_slave_gets_an_effect_that_names_it() -> None:
     truth = real(NAMED, {"name": "column.stiffness", "factor": 0.5, "slave": "north"})
     assert true_system(truth).plan.column == NAMED.column
     north, roof = true_slaves(truth).values()
@@ -121,7 +121,7 @@ def test_a_named_slave_has_the_effect_that_names_it() -> None:
         ),
     ],
 )
-def test_an_effect_at_a_place_that_the_plan_lacks_is_refused(
+def test_an_effect_at_a_site_that_the_plan_lacks_is_refused(
     plan: Plan, given: dict[str, Any], words: str
 ) -> None:
     with pytest.raises(InputError, match=words) as caught:
@@ -129,7 +129,7 @@ def test_an_effect_at_a_place_that_the_plan_lacks_is_refused(
     assert caught.value.exit_code == 2
 
 
-def test_true_tables_of_a_slave_are_those_of_its_kind() -> None:
+def test_a_reality_may_give_a_slave_only_the_tables_of_its_kind() -> None:
     truth = real(NAMED, slave={"north": {"actuator": {"delay": 0.011}, "column": {"stiffness": 1.0e7}}})
     assert truth.plan.of("slave.north").actuator.delay == 0.011
     assert truth.plan.of("slave.north").column.stiffness == 1.0e7
@@ -140,7 +140,7 @@ def test_true_tables_of_a_slave_are_those_of_its_kind() -> None:
         real(NAMED, slave={"north": {"compensator": {"kind": "none"}}})
 
 
-def test_true_parameters_of_a_device(own: Plan) -> None:
+def test_a_reality_sets_the_true_parameters_of_a_device(own: Plan) -> None:
     truth = real(own, device={"parameters": {"stiffness": 1.9e6}})
     assert truth.plan.device.parameters == {"stiffness": 1.9e6}
     with pytest.raises(PlanError, match=r"scale in \[device\] is chosen by the plan"):

@@ -40,7 +40,7 @@ def second_order(s: complex, frequency: float, damping: float) -> complex:
 @pytest.mark.parametrize("frequency", [1.0, 5.0, 10.0, 15.625])
 @pytest.mark.parametrize("gain", [1.0, 0.93])
 @pytest.mark.parametrize(("oil", "damping"), [(math.inf, 0.1), (16.0, 0.1), (10.0, 0.03), (40.0, 0.3)])
-def test_gain_and_oil_column_are_their_transfer_functions(
+def test_gain_and_oil_column_have_their_transfer_functions(
     frequency: float, gain: float, oil: float, damping: float
 ) -> None:
     t = np.arange(1, 3001) * DT
@@ -59,7 +59,7 @@ def test_gain_and_oil_column_are_their_transfer_functions(
 
 
 @pytest.mark.parametrize("compliance", [6e-6, 2.5e-5])
-def test_at_rest_the_damper_does_not_move_the_table_and_in_motion_by_its_force(compliance: float) -> None:
+def test_the_damper_moves_the_compliant_table_by_its_force_and_not_in_statics(compliance: float) -> None:
     frequency = 2.0
     t = np.arange(1, 3001) * DT
     motor = 50.0 * np.cos(2.0 * np.pi * frequency * t) * np.minimum(t, 1.0)
@@ -108,7 +108,7 @@ def test_the_payload_solves_the_coupled_equations(motor_lag: float, oil: float) 
     assert np.all(np.max(np.abs(got[:, :4] - exact), axis=0) < 1e-5 * scale)
 
 
-def test_the_tables_play_is_its_dead_travel() -> None:
+def test_the_tables_dead_travel_equals_its_play() -> None:
     width, command = 1.5e-3, there_and_back(0.02, 0.01, 4000)
     got = run_b(
         command, damper=STILL, table=ShakingTable(delay=0.0), table_effects=TableEffects(backlash=width)
@@ -135,7 +135,7 @@ def test_the_table_sticks_below_its_friction() -> None:
 
 
 @pytest.mark.parametrize("oil", [math.inf, 25.0])
-def test_table_friction_loses_its_force_times_the_way(oil: float) -> None:
+def test_table_friction_dissipates_force_times_distance(oil: float) -> None:
     friction, frequency, omega = 0.3, 2.0, 2.0 * math.pi * 15.0
     t = np.arange(1, 8001) * SHORT
     command = 0.02 * np.sin(2.0 * np.pi * frequency * t)
@@ -156,7 +156,7 @@ def test_table_friction_loses_its_force_times_the_way(oil: float) -> None:
     assert drive - viscous == pytest.approx(2.0 * friction * np.ptp(y[last]), rel=0.01)
 
 
-def test_table_friction_falls_off_with_its_velocity() -> None:
+def test_smoothed_table_friction_depends_on_the_velocity() -> None:
     more = TableEffects(friction=0.5, friction_velocity=0.05)
     omega, ramp = 2.0 * math.pi * 15.0, 0.02 * DT * np.arange(1, 1001)
     got = run_b(ramp, table=ShakingTable(delay=0.0), damper=STILL, table_effects=more)
@@ -165,7 +165,7 @@ def test_table_friction_falls_off_with_its_velocity() -> None:
     assert ramp[-1] - got[-1, Y] == pytest.approx(behind, rel=1e-6)
 
 
-def test_table_friction_by_direction_and_speed() -> None:
+def test_table_friction_depends_on_direction_and_speed() -> None:
     omega, speed = 2.0 * math.pi * 15.0, 0.02
     more = TableEffects(friction=0.5, friction_asymmetry=0.2, friction_drop=0.4, friction_speed=0.01)
     for way, share in ((1.0, 1.2), (-1.0, 0.8)):
@@ -176,7 +176,7 @@ def test_table_friction_by_direction_and_speed() -> None:
         assert way * (ramp[-1] - got[-1, Y]) == pytest.approx(behind, rel=1e-6)
 
 
-def test_a_law_of_the_tables_motion_brakes_it() -> None:
+def test_a_learned_force_of_the_tables_motion_acts_against_it() -> None:
     """One that says a spring does what a stiffer servo loop with a smaller gain would: ω²·(u − y) − s·y."""
     omega, spring = 2.0 * math.pi * 15.0, 900.0
     grid = preisach.pack(preisach.Grid((0.0,), (), ()), 0.02, 1.0)
@@ -201,7 +201,7 @@ def test_a_law_of_the_tables_motion_brakes_it() -> None:
         ("learned", TableEffects(learned=(0.0,) * 16)),
     ],
 )
-def test_an_ideal_table_refuses_what_it_cannot_have(name: str, effects: TableEffects) -> None:
+def test_an_ideal_table_refuses_effects_that_it_cannot_have(name: str, effects: TableEffects) -> None:
     with pytest.raises(InputError, match=r"ideal table .*cannot have the effect") as caught:
         table_lab.build(DT, ShakingTable(frequency=math.inf, delay=0.0), Damper(), effects)
     assert name in str(caught.value)

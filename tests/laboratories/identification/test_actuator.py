@@ -1,4 +1,4 @@
-"""Step response and least squares of the actuator, on the emulated laboratory and on other means."""
+"""Step response and least squares of the actuator, on the emulated laboratory and on scipy's simulation."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def emulated(command: Array, device: Actuator | None = None) -> Array:
 
 
 @pytest.mark.parametrize("held", [False, True])
-def test_a_held_command_is_told_from_a_ramped_one(held: bool) -> None:
+def test_a_held_command_is_distinguished_from_a_ramped_one(held: bool) -> None:
     device = Actuator(gain=0.97, delay=0.0133, time_constant=0.02, command="held" if held else "ramp")
     t = times(1500)
     command = 2e-3 * np.sin(2.0 * np.pi * (0.5 + 1.5 * t) * t)
@@ -84,7 +84,7 @@ def covers(value: estimate.Estimate, true: float) -> bool:
 
 
 @pytest.mark.parametrize("lag", [0.0140, 0.0147, 0.0152])
-def test_the_tangent_has_no_bias_without_noise(lag: float) -> None:
+def test_the_inflection_tangent_has_no_bias_without_noise(lag: float) -> None:
     command = step()
     t = times(command.size)
     for measured in (emulated(command, Actuator(delay=lag)), continuous(command, lag, (0.030,))):
@@ -95,7 +95,7 @@ def test_the_tangent_has_no_bias_without_noise(lag: float) -> None:
         assert (found.delay.unit, found.time_constant.unit, found.gain.unit) == ("s", "s", "")
 
 
-def test_the_tangent_stays_within_a_millisecond_and_its_intervals_cover() -> None:
+def test_the_inflection_tangent_errs_by_less_than_a_millisecond_and_its_intervals_cover() -> None:
     command = step()
     t = times(command.size)
     clean = emulated(command)
@@ -107,7 +107,7 @@ def test_the_tangent_stays_within_a_millisecond_and_its_intervals_cover() -> Non
             assert max(abs(value.value - true) for value in values) < 1e-3, name
 
 
-def test_the_tangent_of_two_lags_meets_that_of_the_exact_response() -> None:
+def test_the_inflection_tangent_of_two_lags_agrees_with_the_exact_response() -> None:
     """Two lags T₁, T₂: inflection at `T₁T₂/(T₁ − T₂)·ln(T₁/T₂)`."""
     slow, fast, lag = 0.030, 0.006, 0.010
     place = slow * fast / (slow - fast) * np.log(slow / fast)
@@ -202,7 +202,7 @@ def test_least_squares_agrees_with_the_continuous_equation() -> None:
 
 
 @pytest.mark.parametrize("kind", ["step", "random"])
-def test_least_squares_intervals_cover(kind: str) -> None:
+def test_least_squares_intervals_cover_the_true_parameters(kind: str) -> None:
     command = step(500) if kind == "step" else random_motion(1000)
     clean = emulated(command)
     fits = [actuator.least_squares(command, clean + noise(seed, clean.size), DT) for seed in SEEDS]
@@ -210,7 +210,7 @@ def test_least_squares_intervals_cover(kind: str) -> None:
         assert np.mean([covers(fit[name], true) for fit in fits]) >= 0.85, name
 
 
-def test_intervals_stay_honest_under_coloured_noise() -> None:
+def test_intervals_cover_under_coloured_noise() -> None:
     command = random_motion(1500)
     clean = emulated(command)
     fits = []
@@ -221,7 +221,7 @@ def test_intervals_stay_honest_under_coloured_noise() -> None:
         assert np.mean([covers(fit[name], true) for fit in fits]) >= 0.85, name
 
 
-def test_a_steady_sine_says_by_its_intervals_that_it_carries_less() -> None:
+def test_a_steady_sine_gives_wider_intervals_than_a_random_motion() -> None:
     t = times(1500)
     sine = 0.004 * np.sin(2.0 * np.pi * t)
     late = emulated(sine)[500:] + noise(4, 1000)
@@ -231,7 +231,7 @@ def test_a_steady_sine_says_by_its_intervals_that_it_carries_less() -> None:
     assert most - least > 5.0 * (high - low)
 
 
-def test_least_squares_refuses_what_carries_nothing() -> None:
+def test_least_squares_refuses_records_without_information() -> None:
     command = random_motion(200)
     measured = emulated(command)
     broken = measured.copy()
@@ -261,7 +261,7 @@ def test_an_autocorrelated_residual_counts_for_fewer_samples() -> None:
     assert estimate.inflation(np.zeros(10)) == 1.0
 
 
-def test_a_direction_that_does_not_show_has_an_infinite_interval() -> None:
+def test_parameters_that_the_record_cannot_separate_have_infinite_intervals() -> None:
     base = np.random.default_rng(1).standard_normal((100, 2))
     jacobian = np.column_stack([base[:, 0], 2.0 * base[:, 0], base[:, 1]])
     spread, _ = estimate.deviations(jacobian, np.random.default_rng(2).standard_normal(100), [100])

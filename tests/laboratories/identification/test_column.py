@@ -39,7 +39,7 @@ def noisy(deformation: Array, force: Array, seed: int) -> tuple[Array, Array]:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("hold", [0, 60])
 @pytest.mark.parametrize("shape", ["triangle", "sine"])
-def test_a_linear_column_is_found_to_a_thousandth(shape: str, hold: int, sign: float) -> None:
+def test_a_linear_columns_stiffness_is_found_to_a_thousandth(shape: str, hold: int, sign: float) -> None:
     deformation = sign * protocol(shape=shape, hold=hold)
     found = column.cycles(*noisy(deformation, STIFFNESS * deformation, 1), AMPLITUDES)
     assert found.stiffness.value == pytest.approx(STIFFNESS, rel=1e-3)
@@ -51,7 +51,7 @@ def test_a_linear_column_is_found_to_a_thousandth(shape: str, hold: int, sign: f
         assert abs(cycle.damping_ratio) < 2e-3
 
 
-def test_the_interval_covers_the_elastic_stiffness() -> None:
+def test_the_confidence_interval_covers_the_elastic_stiffness() -> None:
     deformation = protocol(400)
     hits = 0
     for seed in range(40):
@@ -64,7 +64,7 @@ def test_the_interval_covers_the_elastic_stiffness() -> None:
     assert hits >= 34
 
 
-def test_ellipses_have_their_area_and_damping() -> None:
+def test_elliptic_loops_give_their_area_and_equivalent_damping() -> None:
     """`f = k·δ + c·δ̇` on a sine: area `π·c·ω·a²`, equivalent damping `c·ω/(2k)`."""
     ticks, interval = 2000, 0.002
     omega = 2.0 * np.pi / (ticks * interval)
@@ -79,7 +79,7 @@ def test_ellipses_have_their_area_and_damping() -> None:
         assert cycle.damping_ratio == pytest.approx(dashpot * omega / (2.0 * STIFFNESS), rel=0.04)
 
 
-def test_a_yielding_column_dissipates_what_its_loop_encloses() -> None:
+def test_a_yielding_columns_dissipated_energy_is_the_area_of_its_loop() -> None:
     """Bilinear: `4·(1 − α)·k·δ_y·(X − δ_y)`, secant `k·(α + (1 − α)·δ_y/X)`."""
     limit, hardening = 0.002, 0.1
     code, params, memory = specimens.pack(

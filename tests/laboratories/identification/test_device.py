@@ -58,7 +58,9 @@ def test_the_parameters_of_a_viscous_damper_are_found(damper: Device, plan: Plan
     assert max(found.nrmse.values()) < 0.01
 
 
-def test_a_record_that_carries_nothing_is_refused(damper: Device, plan: Plan, commands: Array) -> None:
+def test_records_without_information_on_a_device_are_refused(
+    damper: Device, plan: Plan, commands: Array
+) -> None:
     read = measured(damper, plan, commands)
     zero = np.zeros(commands.size)
     with pytest.raises(InputError, match="command is constant"):
@@ -73,7 +75,9 @@ def test_a_record_that_carries_nothing_is_refused(damper: Device, plan: Plan, co
         )
 
 
-def test_the_response_is_that_of_the_kernel_tick_by_tick(damper: Device, plan: Plan, commands: Array) -> None:
+def test_the_identified_response_equals_the_kernel_tick_by_tick(
+    damper: Device, plan: Plan, commands: Array
+) -> None:
     few = commands[700:800]
     found = device.response(damper.build(System(plan)), few, np.zeros(few.size), 2)
     lab, truth = damper.build(System(plan)), np.zeros(2)

@@ -52,7 +52,7 @@ def white(seed: int, size: int, rms: float) -> Array:
 @pytest.mark.parametrize(
     ("frequency", "ratio", "lag"), [(15.0, 0.7, 0.004), (8.0, 0.35, 0.0113), (30.0, 1.2, 0.0)]
 )
-def test_the_table_is_found(frequency: float, ratio: float, lag: float) -> None:
+def test_the_tables_parameters_are_found(frequency: float, ratio: float, lag: float) -> None:
     command = tones(2500, 0.5, 25.0, 0.002)
     moved = emulated(command, np.zeros(2500), ShakingTable(frequency, ratio, lag))[0] + white(1, 2500, 1e-5)
     fit = table.least_squares(command, moved, DT)
@@ -78,7 +78,7 @@ def test_the_table_agrees_with_the_continuous_equation() -> None:
 
 
 @pytest.mark.slow
-def test_the_tables_intervals_cover() -> None:
+def test_the_tables_intervals_cover_its_true_parameters() -> None:
     command = tones(1500, 0.5, 20.0, 0.002, seed=3)
     clean = emulated(command, np.zeros(1500))[0]
     fits = [table.least_squares(command, clean + white(seed, 1500, 1e-5), DT) for seed in SEEDS]
@@ -86,7 +86,7 @@ def test_the_tables_intervals_cover() -> None:
         assert np.mean([fit[name].low <= true <= fit[name].high for fit in fits]) >= 0.85, name
 
 
-def test_the_frequency_response_and_bandwidth_are_the_models() -> None:
+def test_the_frequency_response_and_bandwidth_agree_with_the_model() -> None:
     ticks = 30_000
     command = white(1, ticks, 1e-3)
     moved = emulated(command, np.zeros(ticks))[0] + white(2, ticks, 1e-5)
@@ -102,7 +102,7 @@ def test_the_frequency_response_and_bandwidth_are_the_models() -> None:
     assert read.delay == pytest.approx(0.004 + 2.0 * 0.7 / (2.0 * np.pi * 15.0), abs=4e-4)
 
 
-def test_a_table_that_is_never_late_has_no_bandwidth() -> None:
+def test_a_table_that_lags_only_by_the_sampling_has_no_bandwidth() -> None:
     command = white(1, 4000, 1e-3)
     found = table.frequency_response(command, np.concatenate([[0.0], command[:-1]]), DT)
     read = table.bandwidth(found)
@@ -110,7 +110,7 @@ def test_a_table_that_is_never_late_has_no_bandwidth() -> None:
     assert read.delay == pytest.approx(0.0, abs=1e-6)
 
 
-def test_tables_records_that_carry_nothing_are_refused() -> None:
+def test_table_records_without_information_are_refused() -> None:
     command = tones(400, 0.5, 20.0, 0.002)
     moved = emulated(command, np.zeros(400))[0]
     cases: list[tuple[Any, Any, str]] = [
@@ -136,7 +136,7 @@ def shaken(seed: int, motor: Array, clean: Array) -> damper.DamperFit:
 
 
 @pytest.mark.slow
-def test_the_damper_is_found_and_its_intervals_cover() -> None:
+def test_the_dampers_parameters_are_found_and_its_intervals_cover() -> None:
     motor = tones(1000, 0.2, 5.0, 40.0)
     clean = emulated(np.zeros(1000), motor)
     fits = [shaken(seed, motor, clean) for seed in SEEDS]
@@ -160,7 +160,7 @@ def test_without_a_force_mass_and_gain_are_not_separable() -> None:
     assert set(held.parameters) == {"mass", "damping", "stiffness"}
 
 
-def test_a_drive_without_a_spring_is_followed_piece_by_piece() -> None:
+def test_a_damper_without_a_spring_is_identified_piece_by_piece() -> None:
     force, position = drive()
     planned = replace(
         Damper(), mass=1.1 * MASS, stiffness=0.0, damping=0.8 * DASHPOT, motor_time_constant=0.0
@@ -188,7 +188,7 @@ def test_a_shaken_table_excites_the_damper() -> None:
         assert fit[name].value == pytest.approx(TRUE[name], rel=0.01), name
 
 
-def test_friction_of_another_solver_is_found() -> None:
+def test_friction_simulated_by_another_solver_is_found() -> None:
     """Coulomb friction with a sign 2.5 times as sharp, integrated by LSODA with the motor's states."""
     ticks, friction = 1500, 2.0
     motor = tones(ticks, 0.2, 4.0, 60.0, seed=4)
@@ -215,7 +215,7 @@ def test_friction_of_another_solver_is_found() -> None:
     assert fit["stiffness"].value == pytest.approx(56.8, rel=0.05)
 
 
-def test_dampers_records_that_carry_nothing_are_refused() -> None:
+def test_damper_records_without_information_are_refused() -> None:
     motor = tones(300, 0.2, 5.0, 40.0)
     clean = emulated(np.zeros(300), motor)
     stroke, force = clean[2], clean[3]
