@@ -35,6 +35,7 @@ LOOK_S = 0.3  # s between two looks for tests on this machine
 STOPS = (STOP, EMERGENCY)
 STILL = frozenset({Mode.IDLE.value, Mode.CONFIGURED.value, Mode.ARMED.value})  # in which nothing has moved
 BUSY = "A test runs, which a check would disturb."
+OVER = Outcome(UNHEARD, "This part of the panel has ended: start `rths panel` again.")
 
 
 class Job(NamedTuple):
@@ -107,6 +108,7 @@ class Hands:
         self._shown: Shown | None = None
         self._sought = 0.0
         self._closing = threading.Event()
+        self._ended = False
         self._opener = ThreadPoolExecutor(1)
         self._thread = threading.Thread(target=self._run, name="hands")
         self._thread.start()
@@ -128,6 +130,9 @@ class Hands:
     def carry_out(self, word: str, digest: str, reason: str) -> Future[Outcome]:
         """Begin with an order at the next turn."""
         settled: Future[Outcome] = Future()
+        if self._ended:
+            settled.set_result(OVER)
+            return settled
         self._queue.put(Job(word, digest, reason, settled, time.monotonic() + PATIENCE_S))
         return settled
 
@@ -146,8 +151,21 @@ class Hands:
     # -- the thread -------------------------------------------------------------------------------
 
     def _run(self) -> None:
-        while not self._closing.is_set():
-            self._turn()
+        try:
+            while not self._closing.is_set():
+                self._turn()
+        finally:
+            self._ended = True
+            self._let_go()
+
+    def _let_go(self) -> None:
+        """Leave no order without an outcome, no check and no link behind."""
+        jobs = [*self._waiting, *self._given.values(), *(job for _, job in self._checks.values())]
+        jobs += [self._arming] if self._arming else []
+        while not self._queue.empty():
+            jobs.append(self._queue.get())
+        for job in jobs:
+            job.settled.set_result(OVER)
         for check, _ in self._checks.values():
             check.end()
         if self._reached is not None:
@@ -333,7 +351,8 @@ def outcome(given: Given) -> Outcome:
     """What became of an order to the laboratories."""
     answers = [
         f"{title(role)}: {'' if one.accepted else 'refused: '}{one.text}"
-        for role, one in given.answers.items()
+        for role in given.due
+        if (one := given.answers.get(role)) is not None
     ]
     if given.silent:
         who = " and the ".join(map(title, given.silent))
