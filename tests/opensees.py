@@ -1,4 +1,4 @@
-"""Whether OpenSees can be tested against here."""
+"""Whether OpenSees is available here for comparisons."""
 
 from __future__ import annotations
 

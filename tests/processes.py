@@ -1,4 +1,4 @@
-"""Processes that tests start: gone with the interpreter that started them, and waited for no longer than said."""
+"""Processes that tests start: they end with the interpreter that started them, and waiting for them is bounded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What kernels must keep to, as references to arrays are not counted in them."""
+"""The rules for kernels, which are compiled without counting references to arrays."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_a_kernel_that_allocates_does_not_compile() -> None:
         compiled.jit(allocating)(3)
 
 
-def test_a_bound_kernel_moves_the_record_that_it_was_given() -> None:
+def test_a_bound_kernel_updates_the_record_that_it_was_given() -> None:
     lab, other = (column.build(0.002, Actuator(), Column()) for _ in range(2))
     move = compiled.bound(column.enter, lab, 0.0)
     for command in np.linspace(1e-4, 2e-3, 20).tolist():
@@ -62,7 +62,7 @@ def test_a_bound_kernel_moves_the_record_that_it_was_given() -> None:
     assert lab.state.any()
 
 
-def test_a_bound_kernel_refuses_what_has_another_type() -> None:
+def test_a_bound_kernel_refuses_arguments_of_another_type() -> None:
     move = compiled.bound(column.enter, column.build(0.002, Actuator(), Column()), 0.0)
     with pytest.raises(TypeError):
         move(None)

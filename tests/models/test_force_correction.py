@@ -28,19 +28,19 @@ def response(correction: ForceCorrection, frequency: float) -> complex:
 
 
 @pytest.mark.parametrize("frequency", [0.5, 1.0, 2.0, 5.0])
-def test_it_is_the_filter_of_its_formula(frequency: float) -> None:
+def test_the_force_correction_has_the_transfer_function_of_its_formula(frequency: float) -> None:
     correction = ForceCorrection(cutoff=0.3, unity=2.0)
     ratio = 0.3 / frequency
     wanted = math.hypot(1.0, 0.15) / complex(1.0, -ratio)
     assert response(correction, frequency) == pytest.approx(wanted, abs=2e-3)
 
 
-def test_without_cutoff_the_force_is_left_alone() -> None:
+def test_without_a_cutoff_the_force_is_unchanged() -> None:
     memory, gain = force_correction.coefficients(ForceCorrection(), DT)
     assert force_correction.step(memory, gain, np.zeros(2), 1234.5) == 1234.5
 
 
-def test_a_constant_force_is_lost() -> None:
+def test_a_constant_force_is_filtered_out() -> None:
     memory, gain = force_correction.coefficients(ForceCorrection(cutoff=0.3), DT)
     state = np.zeros(2)
     out = [force_correction.step(memory, gain, state, 1.0) for _ in range(10_000)]
@@ -48,7 +48,7 @@ def test_a_constant_force_is_lost() -> None:
 
 
 @pytest.mark.parametrize(("cutoff", "percent"), [(0.0, 3.1), (0.3, 5.0)])
-def test_in_the_closed_loop_its_lead_gives_back_what_the_papers_delay_took(
+def test_in_the_closed_loop_the_filters_lead_restores_the_damping_lost_by_the_papers_delay(
     cutoff: float, percent: float
 ) -> None:
     """0.3 Hz leads by atan(0.15)/12.5 = 11.9 ms at 2 Hz, against the paper's residual 12 ms."""

@@ -1,4 +1,4 @@
-"""The acceleration read one tick ahead."""
+"""The extrapolation of the acceleration by one tick."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_a_straight_line_is_continued_exactly(level: float, slope: float) -> Non
     assert trend.ahead(recent, steep) == pytest.approx(level + slope * 0.002 * trend.RECENT, abs=1e-8)
 
 
-def test_a_sine_is_read_ahead_within_a_hundredth() -> None:
+def test_a_sine_is_extrapolated_by_one_tick_within_one_percent() -> None:
     omega, recent, errors = 4.0 * np.pi, np.zeros(trend.RECENT), []
     for k in range(500):
         delay.remember(recent, np.sin(omega * 0.002 * k))

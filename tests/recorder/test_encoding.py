@@ -1,4 +1,4 @@
-"""Rows that the kernel encodes, beside protobuf's own messages and the MCAP library's own file."""
+"""Rows that the kernel encodes, compared with protobuf's own messages and the MCAP library's own file."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 @given(st.data())
-def test_rows_are_encoded_as_protobufs_own_library_does_it(shape: str, data: st.DataObject) -> None:
+def test_encoded_rows_equal_those_of_protobufs_own_library(shape: str, data: st.DataObject) -> None:
     recorded = SHAPES[shape]
     drawn = data.draw(st.lists(st.composite(recorded.drawn)(), min_size=1, max_size=15))
     items, records = [item for item, _ in drawn], [record for _, record in drawn]
@@ -111,7 +111,7 @@ def write(path: Path, *, rows: bool) -> None:
     recording.close({})
 
 
-def test_a_file_of_encoded_rows_is_the_librarys_own_to_the_byte(
+def test_a_file_of_encoded_rows_equals_the_mcap_librarys_to_the_byte(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write(tmp_path / "rows.mcap", rows=True)
@@ -140,11 +140,11 @@ def test_a_full_chunk_is_closed(tmp_path: Path) -> None:
     assert max(found.uncompressed_size for found in summary.chunk_indexes) <= CHUNK_SIZE + size + MESSAGE.size
 
 
-def test_topics_with_texts_or_tables_are_no_rows_of_numbers() -> None:
+def test_topics_with_texts_or_tables_are_not_encoded_as_rows_of_numbers() -> None:
     assert [topic for topic, rows in TOPICS.items() if is_plain(rows)] == list(PLAIN)
 
 
-def test_a_number_that_its_field_cannot_hold_is_no_row() -> None:
+def test_a_row_with_a_number_that_its_field_cannot_hold_is_refused() -> None:
     with pytest.raises(struct.error):
         RowPacker(TOPICS, 1).item("slave", 0, 0, (2**32, 0.0, -1, *[0.0] * 10))
 

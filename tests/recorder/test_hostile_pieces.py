@@ -1,4 +1,4 @@
-"""Pieces of samples that a sender with the right key could send: the recorder lives, and records the rest whole."""
+"""Hostile pieces of samples from a sender with the right key do not harm the recorder or the recording."""
 
 from __future__ import annotations
 
@@ -93,11 +93,11 @@ BYTES = {
 
 
 @pytest.mark.parametrize("packed", BYTES.values(), ids=BYTES.keys())
-def test_what_can_not_be_recorded_is_no_piece(packed: bytes) -> None:
+def test_pieces_that_cannot_be_recorded_are_rejected(packed: bytes) -> None:
     assert Items(PLAN, "slave").unpack(packed) is None
 
 
-def test_a_flag_is_true_or_false_and_nothing_else() -> None:
+def test_a_flag_must_be_true_or_false() -> None:
     topic, latency = LATENCY
     for flag, recorded in ((0, True), (1, True), (2, False)):
         changed = latency[:FLAG_AT] + bytes([flag]) + latency[FLAG_AT + 1 :]
@@ -105,7 +105,7 @@ def test_a_flag_is_true_or_false_and_nothing_else() -> None:
         assert (found is not None) == recorded
 
 
-def test_what_a_laboratory_may_send_is_a_piece() -> None:
+def test_pieces_that_a_laboratory_may_send_are_accepted() -> None:
     items = (SLAVE_ITEM, EVENT, ramp(2, PLAN.ticks + 1))
     assert Items(PLAN, "slave").unpack(msgpack.packb(items)) == items
     roof, cellar = Items(two(), "slave.roof"), Items(two(), "slave.cellar")
@@ -115,7 +115,7 @@ def test_what_a_laboratory_may_send_is_a_piece() -> None:
 
 
 @given(STRUCTURES)
-def test_any_structure_is_a_piece_or_none(content: object) -> None:
+def test_any_structure_is_accepted_as_a_piece_or_rejected(content: object) -> None:
     packed = msgpack.packb(content)
     inlet = Inlet(Items(PLAN, "slave").unpack, most=100)
     found = inlet.take(Samples(1, "slave", 0, packed))
@@ -124,7 +124,7 @@ def test_any_structure_is_a_piece_or_none(content: object) -> None:
     assert isinstance(outlet.next_of(packed, "slave"), int)
 
 
-def test_a_number_beyond_the_test_moves_no_stream() -> None:
+def test_a_sequence_number_beyond_the_test_does_not_advance_a_stream() -> None:
     inlet = Inlet(Items(PLAN, "slave").unpack, most=100)
     packed = msgpack.packb([SLAVE_ITEM])
     assert inlet.take(Samples(1, "slave", 2**61, packed)) == []
@@ -132,7 +132,7 @@ def test_a_number_beyond_the_test_moves_no_stream() -> None:
     assert (inlet.missing(), inlet.total, inlet.rejected) == (None, None, 2)
 
 
-def test_pieces_that_wait_take_bounded_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pieces_that_wait_for_earlier_ones_take_bounded_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     packed = msgpack.packb([SLAVE_ITEM])
     monkeypatch.setattr(outlet, "EARLY_BYTES", 10 * len(packed))
     inlet = Inlet(Items(PLAN, "slave").unpack)
@@ -143,7 +143,7 @@ def test_pieces_that_wait_take_bounded_memory(monkeypatch: pytest.MonkeyPatch) -
     assert (inlet.next, inlet._held, inlet._early) == (11, 0, {})
 
 
-def test_a_recorder_among_hostile_pieces_records_the_test_whole(
+def test_a_recorder_that_gets_hostile_pieces_records_the_test_completely(
     short_plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     deliver, hostile = MemoryEndpoint.send, iter([*BYTES.values()] * 4)

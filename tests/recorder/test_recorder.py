@@ -40,7 +40,7 @@ def recording(tmp_path: Path) -> Recording:
 
 
 class FullDisk:
-    """Stands in for a file on a disk that takes only so many bytes, as `write` to a full one does."""
+    """Stands in for a file on a disk that has room for this many bytes."""
 
     def __init__(self, path: Path, room: int) -> None:
         self._file = path.open("r+b", buffering=0)
@@ -58,7 +58,9 @@ class FullDisk:
         return getattr(self._file, name)
 
 
-def test_a_full_disk_leaves_what_was_written_readable_and_is_said(tmp_path: Path) -> None:
+def test_after_a_full_disk_the_written_samples_are_readable_and_the_failure_is_reported(
+    tmp_path: Path,
+) -> None:
     clock = VirtualClock()
     file = recording(tmp_path)
     file._stream.close()
@@ -94,7 +96,7 @@ def test_a_full_disk_stops_the_test_in_order(short_plan: Plan, tmp_path: Path, m
     assert read(tmp_path / "a.mcap").ticks("master") > 0
 
 
-def test_a_disk_that_is_full_from_the_start_is_no_traceback(short_plan: Plan) -> None:
+def test_a_disk_that_is_full_from_the_start_gives_a_message_without_traceback(short_plan: Plan) -> None:
     if not Path("/dev/full").exists():
         pytest.skip("no /dev/full here")
     full = Recording(Path("/dev/full"), "trial", 1, TOPICS)
@@ -103,7 +105,7 @@ def test_a_disk_that_is_full_from_the_start_is_no_traceback(short_plan: Plan) ->
     full.abandon()
 
 
-def test_a_slow_disk_costs_drops_never_time(tmp_path: Path) -> None:
+def test_a_slow_disk_causes_dropped_samples_and_no_delay(tmp_path: Path) -> None:
     gate = threading.Event()
     sink = FileSink(recording(tmp_path), MonotonicClock())
     write = sink.put
@@ -125,7 +127,7 @@ def test_a_slow_disk_costs_drops_never_time(tmp_path: Path) -> None:
 
 
 class StallingDisk:
-    """Stands in for a file on a disk that takes nothing until it is released, at every write anew."""
+    """Stands in for a file on a disk that blocks every write until it is released."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("r+b", buffering=0)
@@ -145,7 +147,7 @@ class StallingDisk:
         return getattr(self._file, name)
 
 
-def test_a_disk_that_stalls_again_and_again_costs_nothing(tmp_path: Path) -> None:
+def test_a_disk_that_stalls_repeatedly_causes_no_loss(tmp_path: Path) -> None:
     file = recording(tmp_path)
     file._stream.close()
     disk = StallingDisk(tmp_path / "a.mcap")
@@ -167,7 +169,7 @@ def test_a_disk_that_stalls_again_and_again_costs_nothing(tmp_path: Path) -> Non
     assert read(tmp_path / "a.mcap").sequences["slave"].tolist() == list(range(6_000))
 
 
-def test_a_disk_that_hangs_does_not_keep_the_recorder_for_ever(tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_disk_that_hangs_does_not_block_the_recorder_forever(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr("recorder.sink.CLOSE_S", 0.2)
     gate = threading.Event()
     sink = FileSink(recording(tmp_path), MonotonicClock())
@@ -182,7 +184,7 @@ def test_a_disk_that_hangs_does_not_keep_the_recorder_for_ever(tmp_path: Path, m
     sink._recording.abandon()
 
 
-def test_a_recorder_that_lost_its_disk_ends_with_a_sentence(short_plan: Plan, tmp_path: Path) -> None:
+def test_a_recorder_that_lost_its_disk_ends_with_one_sentence(short_plan: Plan, tmp_path: Path) -> None:
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
     recorder = bench.recorder
     assert recorder is not None
@@ -194,7 +196,7 @@ def test_a_recorder_that_lost_its_disk_ends_with_a_sentence(short_plan: Plan, tm
 
 
 @pytest.mark.parametrize(("first", "last"), [(400, 950), (400, 1_990), (1_300, 1_990)])
-def test_a_recorder_that_was_held_up_gets_what_it_missed(
+def test_a_recorder_that_was_paused_receives_the_missed_samples(
     first: int, last: int, short_plan: Plan, tmp_path: Path
 ) -> None:
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
@@ -206,7 +208,7 @@ def test_a_recorder_that_was_held_up_gets_what_it_missed(
         return first < bench.master.ticks < last
 
     def hole_before(message: Any, received_ns: int) -> None:
-        """A piece is lost just before the recorder is held up, so that it wakes up with a hole as old as its sleep."""
+        """A piece is lost just before the recorder is paused, so that the gap is as old as the pause."""
         if not (
             isinstance(message, Samples)
             and first - 30 < message.first < first
@@ -226,14 +228,14 @@ def test_a_recorder_that_was_held_up_gets_what_it_missed(
     assert not [event for event in run.events if event["code"] == "rows_lost"]
 
 
-def test_the_end_of_a_stream_that_never_comes_is_said(short_plan: Plan, tmp_path: Path) -> None:
+def test_the_missing_end_of_a_stream_is_reported(short_plan: Plan, tmp_path: Path) -> None:
     bench = virtual.assemble(short_plan, reality.as_planned(short_plan), tmp_path / "a.mcap")
     recorder = bench.recorder
     assert recorder is not None
     take = recorder.take
 
     def deaf(message: Any, received_ns: int) -> None:
-        """The recorder is held up from tick 1,500 on until both laboratories have left."""
+        """The recorder is paused from tick 1,500 on until both laboratories have left."""
         if bench.master.ticks < 1_500:
             take(message, received_ns)
 
@@ -246,7 +248,7 @@ def test_the_end_of_a_stream_that_never_comes_is_said(short_plan: Plan, tmp_path
     ]
 
 
-def test_a_laboratory_that_took_no_part_has_no_stream_whose_end_is_missing(
+def test_no_missing_end_is_reported_for_a_laboratory_that_took_no_part(
     short_plan: Plan, tmp_path: Path
 ) -> None:
     plan = replace(short_plan, link=replace(short_plan.link, connect_timeout=2.0))
@@ -258,7 +260,7 @@ def test_a_laboratory_that_took_no_part_has_no_stream_whose_end_is_missing(
     assert [one["code"] for one in read(tmp_path / "a.mcap").events] == ["begin", "latched", "refused"]
 
 
-def test_samples_that_the_link_loses_are_asked_for_again(
+def test_samples_that_the_link_loses_are_requested_again(
     short_plan: Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
     deliver, lost = MemoryEndpoint.send, []
@@ -279,7 +281,7 @@ def test_samples_that_the_link_loses_are_asked_for_again(
     assert run.metadata["summary"]["items_lost"] == "0"
 
 
-def test_what_can_not_be_had_again_is_counted_and_said(
+def test_samples_that_cannot_be_sent_again_are_counted_and_reported(
     short_plan: Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
     deliver = MemoryEndpoint.send
@@ -306,7 +308,7 @@ def test_what_can_not_be_had_again_is_counted_and_said(
     assert error.exit_code == 1
 
 
-def test_the_default_name_is_in_the_plans_folder(short_plan: Plan, tmp_path: Path) -> None:
+def test_the_default_recording_is_in_the_plans_folder(short_plan: Plan, tmp_path: Path) -> None:
     plan = with_table(short_plan, "recording", folder=str(tmp_path / "new" / "folder"))
     with reserved(None, plan) as path:
         assert path.parent == tmp_path / "new" / "folder"
@@ -317,7 +319,7 @@ def test_the_default_name_is_in_the_plans_folder(short_plan: Plan, tmp_path: Pat
         pass
 
 
-def test_tests_that_begin_in_one_second_have_files_of_their_own(
+def test_tests_that_begin_in_the_same_second_have_different_files(
     short_plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("recorder.files.time.strftime", lambda _: "20260101-120000")

@@ -1,4 +1,4 @@
-"""The session's number and key stay where they belong: in no recording, no report, no command line."""
+"""The session's number and key appear in no recording, no report and no command line."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def content(path: Path) -> bytes:
     return b"".join(parts)
 
 
-def test_a_recording_knows_nothing_of_its_session(
+def test_a_recording_contains_neither_number_nor_key_of_its_session(
     short_plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(virtual, "SESSION", SESSION)
@@ -76,7 +76,7 @@ MODULE = "runpy.run_module(sys.argv[0], run_name='__main__', alter_sys=True)"
 
 
 @pytest.mark.parametrize("as_json", [True, False], ids=["json", "text"])
-def test_the_processes_say_nothing_of_their_session(tmp_path: Path, as_json: bool) -> None:
+def test_the_processes_print_neither_number_nor_key_of_their_session(tmp_path: Path, as_json: bool) -> None:
     path, recorded, endpoint = tmp_path / "plan.toml", tmp_path / "a.mcap", listenable()
     path.write_text(PATIENT + "[test]\nduration = 0.2\n", encoding="utf-8")
     options = ["--json"] if as_json else []

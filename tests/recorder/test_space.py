@@ -36,7 +36,7 @@ def full(monkeypatch: Any, free: int) -> None:
 @pytest.mark.parametrize("storeys", [1, 3, 20])
 @pytest.mark.parametrize("slaves", [1, 4])
 @pytest.mark.parametrize("topic", TICK_TOPICS)
-def test_the_bytes_of_a_message_are_those_of_its_fields(topic: str, storeys: int, slaves: int) -> None:
+def test_the_size_of_a_message_follows_from_its_fields(topic: str, storeys: int, slaves: int) -> None:
     rows = default_topics([f"slave.{number}" for number in range(slaves)] if slaves > 1 else ["slave"]).get(
         topic, TOPICS[topic]
     )
@@ -61,7 +61,7 @@ def risk_of(plan: Plan, folder: Path) -> str:
     return found.sentence if found else ""
 
 
-def test_a_full_disk_is_said_with_folder_need_and_room(
+def test_a_full_disk_is_reported_with_folder_required_and_free_space(
     short_plan: Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
     assert risk_of(short_plan, tmp_path) == ""
@@ -74,7 +74,7 @@ def test_a_full_disk_is_said_with_folder_need_and_room(
     assert "the free space of the folder" in risk_of(short_plan, tmp_path / "no")
 
 
-def test_a_run_in_virtual_time_is_refused_too_and_an_accepted_risk_is_recorded(
+def test_a_full_disk_refuses_a_run_in_virtual_time_and_an_accepted_risk_is_recorded(
     tmp_path: Path, monkeypatch: Any
 ) -> None:
     from rths.__main__ import parser_for

@@ -1,4 +1,4 @@
-"""The nominal actuator behind a compensator, and the closed forms that say what must come out."""
+"""The nominal actuator behind a compensator, and closed forms of the expected response."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Motion = Callable[[Array], tuple[Array, Array, Array, Array]]
 
 
 class Run(NamedTuple):
-    """Target and measurement at every tick, commands reached one tick later, coefficients of those that adapt."""
+    """Target and measurement at every tick, commands reached one tick later, coefficients of adaptive compensators."""
 
     target: Array
     measured: Array

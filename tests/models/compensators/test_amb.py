@@ -1,4 +1,4 @@
-"""The adaptive model-based compensator: its rule step by step, what it converges to, what leaves it alone."""
+"""The adaptive model-based compensator: its rule, its convergence, and inputs that do not change it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def rule(start: Array, gains: Array, command: Array, measured: Array, cutoff: fl
 
 
 @pytest.mark.parametrize("gains", [[5.0, 2.0, -1.0, -4.0], [8.4, 6.2, 2.1, 0.8], [14.0, 12.0, 9.0, 6.0]])
-def test_each_step_is_that_of_the_gradient(gains: list[float]) -> None:
+def test_each_step_agrees_with_the_implicit_gradient_rule(gains: list[float]) -> None:
     g = {f"g{i}": gain for i, gain in enumerate(gains)}
     r, rate, bend, jerk = waves(BAND)(clock(1201))
     measured = waves([(0.7, 0.005, 0.4), (2.3, 0.002, 1.4)])(clock(1200) - 0.03)[0]
@@ -56,7 +56,7 @@ def test_each_step_is_that_of_the_gradient(gains: list[float]) -> None:
 
 
 @pytest.mark.parametrize("noise", [None, NOISE])
-def test_it_finds_the_inverse_of_another_actuator(noise: Array | None) -> None:
+def test_amb_converges_to_the_inverse_of_another_actuator(noise: Array | None) -> None:
     run = drive("amb", {**WRONG, **GAINS}, waves(BAND), 20_000, noise=noise)
     for frequency, _, _ in BAND:
         got = response(run, frequency, 10.0)
@@ -64,7 +64,7 @@ def test_it_finds_the_inverse_of_another_actuator(noise: Array | None) -> None:
         assert abs(got) == pytest.approx(1.0, abs=0.02)
 
 
-def test_it_follows_an_actuator_whose_gain_is_another() -> None:
+def test_amb_tracks_with_an_actuator_of_another_gain() -> None:
     actuator = Actuator(gain=0.9, delay=0.020, time_constant=0.025)
     run = drive("amb", {**LAG, **GAINS}, waves(BAND), 20_000, actuator)
     assert run.coefficients[-1, 0] == pytest.approx(1.0 / 0.9, rel=0.02)
@@ -100,7 +100,7 @@ def test_coefficients_stay_finite_and_positive_whatever_is_measured(
 
 @given(exponents=st.lists(st.floats(0.0, 20.0), min_size=4, max_size=4))
 @settings(max_examples=25, deadline=None)
-def test_gains_of_any_size_leave_the_true_inverse_alone(exponents: list[float]) -> None:
+def test_adaptation_gains_of_any_size_keep_the_true_inverse(exponents: list[float]) -> None:
     """A static actuator of gain one has the inverse 1, 0, 0, 0, where every error is zero up to rounding."""
     gains = {f"g{i}": value for i, value in enumerate(exponents)}
     built = compensators.build("amb", {"a0": 1.0, "a1": 0.0, "a2": 0.0, "a3": 0.0, **gains}, DT)
@@ -112,12 +112,12 @@ def test_gains_of_any_size_leave_the_true_inverse_alone(exponents: list[float]) 
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.004])
-def test_noise_alone_teaches_nothing(offset: float) -> None:
+def test_noise_alone_does_not_change_the_coefficients(offset: float) -> None:
     run = drive("amb", {}, sine(1.0, 0.0), 20_000, noise=NOISE + offset)
     assert (run.coefficients == run.coefficients[0]).all()
 
 
-def test_after_the_motion_the_coefficients_rest() -> None:
+def test_after_the_motion_the_coefficients_stay_constant() -> None:
     def burst(time: Array) -> tuple[Array, Array, Array, Array]:
         rows = [row * (time < 4.0) for row in sine(1.0, 0.004)(time)]
         return rows[0], rows[1], rows[2], rows[3]
@@ -128,7 +128,7 @@ def test_after_the_motion_the_coefficients_rest() -> None:
     assert (tail == tail[0]).all()
 
 
-def test_a_measurement_that_is_no_number_freezes_the_coefficients() -> None:
+def test_a_nan_measurement_freezes_the_coefficients() -> None:
     built = compensators.build("amb", {}, DT)
     start = built.state[:4].copy()
     for k in range(500):
@@ -136,6 +136,6 @@ def test_a_measurement_that_is_no_number_freezes_the_coefficients() -> None:
     assert (built.state[:4] == start).all()
 
 
-def test_a_filter_that_cannot_be_is_refused() -> None:
+def test_an_impossible_filter_is_refused() -> None:
     with pytest.raises(InputError, match="cutoff of compensator 'amb' is 250, but must be below 250 Hz"):
         compensators.build("amb", {"cutoff": 250.0}, DT)

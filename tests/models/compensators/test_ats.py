@@ -1,4 +1,4 @@
-"""The adaptive time series: what it converges to, and the bounds it never leaves."""
+"""The adaptive time series: its convergence, and the bounds on its coefficients."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def then_still(motion: Motion, end: float, offset: float = 0.0) -> Motion:
 
 @pytest.mark.parametrize("lead", [0.0, 0.02, 0.044, 0.07])
 @pytest.mark.parametrize("noise", [None, NOISE])
-def test_it_finds_the_inverse_from_any_start(lead: float, noise: Array | None) -> None:
+def test_ats_converges_to_the_inverse_from_any_start(lead: float, noise: Array | None) -> None:
     run = drive("ats", {"lead": lead}, waves(BAND), 8000, noise=noise)
     a0, a1, a2 = run.coefficients[-1]
     assert a0 == pytest.approx(TRUE[0], abs=0.005)
@@ -62,7 +62,7 @@ def test_it_finds_the_inverse_from_any_start(lead: float, noise: Array | None) -
 
 @pytest.mark.parametrize("noise", [None, NOISE])
 @pytest.mark.parametrize("frequency", [0.5, 1.0, 2.0, 3.0])
-def test_a_single_sine_is_followed_although_it_leaves_a0_and_a2_to_each_other(
+def test_a_single_sine_is_tracked_although_it_does_not_determine_a0_and_a2_separately(
     frequency: float, noise: Array | None
 ) -> None:
     run = drive("ats", {"lead": 0.02}, sine(frequency, 0.005), 8000, noise=noise)
@@ -71,12 +71,12 @@ def test_a_single_sine_is_followed_although_it_leaves_a0_and_a2_to_each_other(
     assert abs(got) == pytest.approx(1.0, abs=0.001)
 
 
-def test_the_start_is_forgotten() -> None:
+def test_the_coefficients_do_not_depend_on_their_start() -> None:
     ends = [drive("ats", {"lead": lead}, waves(BAND), 8000).coefficients[-1] for lead in (0.02, 0.07)]
     assert ends[0] == pytest.approx(ends[1], rel=1e-6)
 
 
-def test_it_follows_an_actuator_that_is_not_the_nominal_one() -> None:
+def test_ats_tracks_with_an_actuator_that_is_not_the_nominal_one() -> None:
     actuator = Actuator(gain=0.9, delay=0.020, time_constant=0.025)
     a0, a1, _ = drive("ats", {}, waves(BAND), 8000, actuator).coefficients[-1]
     assert a0 == pytest.approx(1.0 / 0.9, rel=0.01)
@@ -95,7 +95,9 @@ def test_commands_and_measurements_are_paired_by_time() -> None:
 
 @given(seed=st.integers(0, 2**32 - 1), size=st.floats(-7.0, 7.0), jumps=st.booleans())
 @settings(max_examples=25, deadline=None)
-def test_boxes_and_rates_hold_whatever_is_measured(seed: int, size: float, jumps: bool) -> None:
+def test_bounds_on_coefficients_and_their_rates_hold_whatever_is_measured(
+    seed: int, size: float, jumps: bool
+) -> None:
     rng = np.random.default_rng(seed)
     numbers = rng.normal(0.0, 10.0**size, (1500, 5))
     if jumps:
@@ -121,7 +123,7 @@ def test_below_the_trigger_the_coefficients_are_frozen() -> None:
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.004])
-def test_a_quiet_tail_changes_nothing(offset: float) -> None:
+def test_a_quiet_tail_does_not_change_the_coefficients(offset: float) -> None:
     """30 s of noise after the motion, also with the specimen left deformed far above the trigger."""
     motion = then_still(waves(BAND), 8.0, offset)
     run = drive("ats", {}, motion, 20_000, noise=NOISE)
@@ -133,8 +135,8 @@ def test_a_quiet_tail_changes_nothing(offset: float) -> None:
     )
 
 
-def test_a_free_vibration_that_dies_out_ends_in_frozen_coefficients() -> None:
-    """At the vibration's own pole the inverse found is good; it was learnt down to noise near the trigger."""
+def test_a_decaying_free_vibration_ends_in_frozen_coefficients() -> None:
+    """The inverse is accurate at the pole of the vibration; the fit includes noise near the trigger."""
     pole = 2.0 * np.pi * (-0.04 + 1j) * 1.6
 
     def decay(time: Array) -> tuple[Array, Array, Array, Array]:
@@ -150,7 +152,7 @@ def test_a_free_vibration_that_dies_out_ends_in_frozen_coefficients() -> None:
     assert abs(left) == pytest.approx(1.0, abs=0.02)
 
 
-def test_noise_alone_teaches_nothing() -> None:
+def test_noise_alone_does_not_change_the_coefficients() -> None:
     run = drive("ats", {}, sine(1.0, 0.0), 20_000, noise=NOISE + 0.003)
     assert (run.coefficients == run.coefficients[0]).all()
 
@@ -170,7 +172,7 @@ def test_the_running_sums_do_not_drift() -> None:
     assert built.state[ats.SUMS : ats.SUMS + 10] == pytest.approx(exact, rel=1e-9, abs=1e-12 * scale)
 
 
-def test_a_window_of_a_constant_is_singular_and_keeps_the_coefficients() -> None:
+def test_a_window_of_constant_values_keeps_the_coefficients() -> None:
     built = compensators.build("ats", {}, DT)
     start = built.state[:3].copy()
     for _ in range(1500):
@@ -178,7 +180,7 @@ def test_a_window_of_a_constant_is_singular_and_keeps_the_coefficients() -> None
     assert (built.state[:3] == start).all()
 
 
-def test_a_measurement_that_is_no_number_freezes_the_coefficients() -> None:
+def test_a_nan_measurement_freezes_the_coefficients() -> None:
     built = compensators.build("ats", {}, DT)
     start = built.state[:3].copy()
     for k in range(1500):
@@ -192,12 +194,12 @@ def test_the_same_input_gives_the_same_bits() -> None:
     assert (runs[0].coefficients == runs[1].coefficients).all()
 
 
-def test_it_starts_from_the_series_inverse_of_a_lag_behind_its_lead() -> None:
+def test_ats_starts_from_the_series_inverse_of_a_lag_for_its_lead() -> None:
     start = compensators.build("ats", {"lead": L, "time_constant": T}, DT).state[:3]
     assert start == pytest.approx(TRUE, rel=1e-12)
 
 
-def test_starts_and_filters_that_cannot_be_are_refused() -> None:
+def test_impossible_starts_and_filters_are_refused() -> None:
     with pytest.raises(InputError, match="lead of compensator 'ats' is 0.05, but must be at most a1_most"):
         compensators.build("ats", {"lead": 0.05, "a1_most": 0.04}, DT)
     with pytest.raises(InputError, match="lead and time_constant of compensator 'ats' is 0.05, but"):

@@ -43,7 +43,7 @@ FEEDFORWARD = [kind for kind in COMPENSATORS if kind != "pi_lead"]  # which comm
         *(("pid_inverse", {**GAINS, **PLANT, "order": order}) for order in (1, 2, 3)),
     ],
 )
-def test_delay_and_amplitude_left_are_those_of_theory(
+def test_residual_delay_and_amplitude_agree_with_theory(
     kind: str, parameters: dict[str, float], frequency: float
 ) -> None:
     got = response(drive(kind, parameters, sine(frequency), 5000), frequency)
@@ -52,7 +52,7 @@ def test_delay_and_amplitude_left_are_those_of_theory(
     assert abs(got) == pytest.approx(abs(expected), abs=5e-4)
 
 
-def test_the_residuals_of_the_seed_paper() -> None:
+def test_the_residual_delays_agree_with_the_seed_paper() -> None:
     """Figures quoted in the paper and derived in the docstring of `pid_taylor`."""
     cases: list[tuple[dict[str, float], float]] = [({"lead": 0.0}, 0.044 / 2.93), ({"lead": 0.044}, 0.0)]
     for lead, expected in cases:
@@ -62,14 +62,14 @@ def test_the_residuals_of_the_seed_paper() -> None:
 
 @pytest.mark.parametrize("kind", FEEDFORWARD)
 @pytest.mark.parametrize("target", [0.5, -0.003, 0.0])
-def test_a_still_target_is_left_alone(kind: str, target: float) -> None:
+def test_a_constant_target_is_commanded_unchanged(kind: str, target: float) -> None:
     built = compensators.build(kind, TYPICAL[kind], DT)
     got = [ask(built, target, present=target, measured=target) for _ in range(1200)]
     assert got == pytest.approx(np.full(1200, target), rel=1e-13)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
-def test_taylor_is_exact_on_polynomials_of_its_order(order: int) -> None:
+def test_taylor_is_exact_for_polynomials_of_its_order(order: int) -> None:
     lead = 0.0437
     polynomial = np.polynomial.Polynomial([0.3, -1.2, 5.0, -70.0][: order + 1])
     built = compensators.build("taylor", {"lead": lead, "order": order}, DT)
@@ -78,7 +78,7 @@ def test_taylor_is_exact_on_polynomials_of_its_order(order: int) -> None:
         assert ask(built, *derivatives) == pytest.approx(polynomial(time + lead), rel=1e-12)
 
 
-def test_pid_taylor_is_of_first_order_unless_asked() -> None:
+def test_pid_taylor_is_first_order_by_default() -> None:
     built = compensators.build("pid_taylor", {**GAINS, "lead": 0.1}, DT)
     assert ask(built, 1.0, 2.0, 3.0, 4.0) == 1.0 + 0.1 * 2.0
     built = compensators.build("pid_taylor", {**GAINS, "lead": 0.1, "order": 3}, DT)
@@ -86,7 +86,7 @@ def test_pid_taylor_is_of_first_order_unless_asked() -> None:
     assert ask(built, 1.0, 2.0, 3.0, 4.0) == pytest.approx(expected, rel=1e-15)
 
 
-def test_the_pid_terms_are_those_of_equation_3() -> None:
+def test_the_pid_terms_agree_with_equation_3() -> None:
     built = compensators.build("pid", {"proportional": 2.0, "integral": 3.0, "derivative": 0.5}, DT)
     errors = [0.0, 0.1, 0.3, 0.2]
     got = [ask(built, 1.0, present=error) for error in errors]
@@ -103,7 +103,7 @@ def test_every_kind_has_a_rule_for_each_parameter_and_its_own_code(kind: str) ->
 
 
 @pytest.mark.parametrize("kind", COMPENSATORS)
-def test_unknown_parameters_are_refused_with_the_nearest(kind: str) -> None:
+def test_unknown_parameters_are_refused_with_the_nearest_name(kind: str) -> None:
     with pytest.raises(InputError, match=f"Unknown parameter 'zzz' of compensator '{kind}'"):
         compensators.build(kind, {**TYPICAL[kind], "zzz": 1.0}, DT)
     for name in COMPENSATORS[kind].params._fields:
@@ -111,7 +111,7 @@ def test_unknown_parameters_are_refused_with_the_nearest(kind: str) -> None:
             compensators.build(kind, {**TYPICAL[kind], name + "x": 1.0}, DT)
 
 
-def test_unknown_kinds_are_refused_with_the_nearest() -> None:
+def test_unknown_kinds_are_refused_with_the_nearest_name() -> None:
     for wrong, right in [("tailor", "taylor"), ("horiuchy", "horiuchi"), ("invers", "inverse")]:
         with pytest.raises(InputError, match=f"did you mean {right}"):
             compensators.build(wrong, {}, DT)
@@ -142,7 +142,7 @@ def test_values_out_of_range_are_refused(kind: str, name: str) -> None:
             compensators.build(kind, {**TYPICAL[kind], name: value}, DT)
 
 
-def test_the_numbers_of_pid_and_pid_taylor_are_the_plain_expressions_to_the_last_bit() -> None:
+def test_pid_and_pid_taylor_equal_the_plain_expressions_to_the_last_bit() -> None:
     rng = np.random.default_rng(5)
     P, I, D, lead = 1.93, 0.047, 0.003, 0.0088  # noqa: E741
     gains = {"proportional": P, "integral": I, "derivative": D}

@@ -13,7 +13,7 @@ from tests.models.compensators.rig import DT, ask
 
 
 @pytest.mark.parametrize(("order", "weights"), [(1, [2, -1]), (2, [3, -3, 1]), (3, [4, -6, 4, -1])])
-def test_the_weights_are_those_published(order: int, weights: list[float]) -> None:
+def test_horiuchis_weights_are_the_published_ones(order: int, weights: list[float]) -> None:
     p = compensators.build("horiuchi", {"delay": 5 * DT, "order": order}, DT).params
     taps = p[horiuchi.FIRST :].reshape(-1, 2)
     assert p[horiuchi.TAPS] == order + 1
@@ -27,7 +27,7 @@ def test_the_weights_are_those_published(order: int, weights: list[float]) -> No
     coefficients=st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4),
 )
 @settings(max_examples=60, deadline=None)
-def test_polynomials_of_its_order_are_met_exactly(
+def test_horiuchi_is_exact_for_polynomials_of_its_order(
     order: int, ticks: float, coefficients: list[float]
 ) -> None:
     polynomial = np.polynomial.Polynomial(coefficients[: order + 1])
@@ -39,7 +39,7 @@ def test_polynomials_of_its_order_are_met_exactly(
     assert got[past:] == pytest.approx(polynomial(times[past:] + delay), abs=1e-11)
 
 
-def test_a_delay_below_one_tick_still_meets_a_cubic() -> None:
+def test_horiuchi_is_exact_for_a_cubic_with_a_delay_below_one_tick() -> None:
     polynomial = np.polynomial.Polynomial([0.1, -0.4, 2.0, 9.0])
     built = compensators.build("horiuchi", {"delay": 0.3 * DT, "order": 3}, DT)
     times = DT * np.arange(1, 50)
@@ -47,6 +47,6 @@ def test_a_delay_below_one_tick_still_meets_a_cubic() -> None:
     assert got[5:] == pytest.approx(polynomial(times[5:] + 0.3 * DT), abs=1e-12)
 
 
-def test_before_its_start_the_target_counts_as_still() -> None:
+def test_the_target_counts_as_constant_before_its_start() -> None:
     built = compensators.build("horiuchi", {"delay": 5 * DT, "order": 3}, DT)
     assert ask(built, 0.21, present=0.2) == pytest.approx(0.2 + 4 * 0.01)

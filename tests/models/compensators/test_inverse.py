@@ -15,7 +15,7 @@ PLANT = {"delay": 0.014, "time_constant": 0.030, "gain": 0.8}
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
-def test_the_coefficients_are_those_of_the_series(order: int) -> None:
+def test_the_coefficients_equal_those_of_the_series(order: int) -> None:
     """Against the product of the two series, (1 + Ts)·Σ (Ls)^j/j!, cut after the order."""
     p = compensators.build("inverse", {**PLANT, "order": order}, DT).params
     lead = [0.014**j / math.factorial(j) for j in range(5)]
@@ -23,21 +23,21 @@ def test_the_coefficients_are_those_of_the_series(order: int) -> None:
     assert p[4:] == pytest.approx(np.pad(product, (0, 3 - order)), rel=1e-12)
 
 
-def test_without_a_lag_it_is_the_taylor_series() -> None:
+def test_without_a_lag_the_inverse_is_the_taylor_series() -> None:
     fixed = compensators.build("inverse", {"delay": 0.044, "time_constant": 0.0, "order": 3}, DT)
     taylor = compensators.build("taylor", {"lead": 0.044, "order": 3}, DT)
     numbers = (0.1, -2.0, 30.0, 400.0)
     assert ask(fixed, *numbers) == pytest.approx(ask(taylor, *numbers), rel=1e-14)
 
 
-def test_without_dead_time_the_first_order_is_exact() -> None:
+def test_without_dead_time_the_first_order_inverse_is_exact() -> None:
     c = inverse.coefficients(0.0, 0.03, 2.0, 3.0)
     assert c.tolist() == [0.5, 0.015, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("frequency", [0.5, 1.0, 2.0, 3.0])
 @pytest.mark.parametrize("kind", ["inverse", "pid_inverse"])
-def test_each_order_brings_the_actuator_nearer_to_its_target(kind: str, frequency: float) -> None:
+def test_each_order_reduces_the_actuators_tracking_error(kind: str, frequency: float) -> None:
     gains = GAINS if kind == "pid_inverse" else {}
     plant = {"delay": 0.014, "time_constant": 0.030}
     left = []
@@ -50,7 +50,7 @@ def test_each_order_brings_the_actuator_nearer_to_its_target(kind: str, frequenc
     assert left[2] < 2e-3
 
 
-def test_feedback_divides_what_a_wrong_inverse_leaves() -> None:
+def test_feedback_reduces_the_error_of_a_wrong_inverse() -> None:
     wrong = {"delay": 0.010, "time_constant": 0.024}
     alone = response(drive("inverse", wrong, sine(1.0), 5000), 1.0)
     both = response(drive("pid_inverse", GAINS | wrong, sine(1.0), 5000), 1.0)

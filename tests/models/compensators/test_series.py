@@ -18,7 +18,7 @@ def test_the_command_is_the_sum_of_its_terms() -> None:
     assert ask(built, 1.0, 2.0, -4.0, 8.0) == 1.25 + 1.0 - 0.5 + 0.5
 
 
-def test_with_the_series_of_a_lag_it_is_the_inverse_of_that_lag() -> None:
+def test_the_series_of_a_lag_inverts_that_lag() -> None:
     c = inverse.coefficients(0.014, 0.03, 0.8, 3.0)
     fixed = compensators.build("series", {f"a{i}": float(c[i]) for i in range(4)}, DT)
     other = compensators.build(
@@ -29,7 +29,7 @@ def test_with_the_series_of_a_lag_it_is_the_inverse_of_that_lag() -> None:
 
 
 @pytest.mark.parametrize("frequency", [0.5, 2.0, 5.0, 10.0])
-def test_the_defaults_invert_the_plant_of_the_benchmark(frequency: float) -> None:
+def test_the_default_series_inverts_the_plant_of_the_benchmark(frequency: float) -> None:
     """Against the response of the servo-hydraulics with the benchmark's specimen."""
     a, b = servo_hydraulic.rates(ServoHydraulics(), 1.19e6, 114.6, 29.13, 0.0)
     s = 2j * np.pi * frequency

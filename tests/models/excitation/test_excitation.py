@@ -1,4 +1,4 @@
-"""Programmes of bench tests: what they ask, and that they start and end at rest."""
+"""Programmes of bench tests: their commands, and that they start and end at rest."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_a_programme_is_at_rest_at_both_ends_and_between_its_pieces(part: str) -
     assert np.all(np.isfinite(found.motion))
 
 
-def test_the_static_cycles_are_the_papers() -> None:
+def test_the_static_cycles_have_the_papers_amplitudes() -> None:
     piece = static_cycles(DT, (1.5e-3, 7.5e-3), cycles=3, speed=3e-3, hold=0.25)
     turns = piece.values[np.flatnonzero(np.diff(np.sign(np.diff(piece.values, append=0.0))) != 0) + 1]
     assert np.max(np.abs(np.diff(piece.values))) == pytest.approx(3e-3 * DT, rel=1e-9)
@@ -32,7 +32,7 @@ def test_the_static_cycles_are_the_papers() -> None:
     assert piece.values[-1] == 0.0
 
 
-def test_derivatives_are_those_of_the_sine() -> None:
+def test_the_programmes_derivatives_are_those_of_the_sine() -> None:
     found = excitation.join([sine(DT, 2.0, amplitude=5e-3, cycles=10)], DT)
     ((_, begin, end, _),) = found.segments
     t = np.arange(end - begin) * DT
@@ -50,7 +50,7 @@ def test_a_step_has_no_derivatives() -> None:
     assert np.all(found.motion[RATE:] == 0.0)
 
 
-def test_the_random_wave_has_its_band_its_rms_and_its_seed() -> None:
+def test_the_random_wave_has_the_band_and_rms_asked_for_and_depends_on_its_seed() -> None:
     first, again, other = (
         random_wave(DT, band=(0.1, 3.0), rms=1.5e-3, duration=30.0, seed=seed).values for seed in (1, 1, 2)
     )
@@ -62,7 +62,7 @@ def test_the_random_wave_has_its_band_its_rms_and_its_seed() -> None:
     assert power[frequency > 3.2].sum() < 1e-3 * power.sum()
 
 
-def test_the_sweep_keeps_its_curvature() -> None:
+def test_the_sweep_keeps_its_peak_acceleration() -> None:
     values = sweep(DT, (0.5, 25.0), duration=40.0, amplitude=10e-3, curvature=3.0).values
     assert np.max(np.abs(values)) == pytest.approx(10e-3, rel=0.05)
     assert np.max(np.abs(np.diff(values, 2) / DT**2)) < 3.3

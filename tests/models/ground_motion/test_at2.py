@@ -33,7 +33,7 @@ def written(
         "3, 0.0100 NPTS, DT",
     ],
 )
-def test_every_spelling_of_the_sampling_line_is_read(tmp_path: Path, sampling: str) -> None:
+def test_every_form_of_the_sampling_line_is_read(tmp_path: Path, sampling: str) -> None:
     motion = read_at2(written(tmp_path, sampling))
     assert motion.interval == 0.01
     np.testing.assert_allclose(
@@ -41,7 +41,7 @@ def test_every_spelling_of_the_sampling_line_is_read(tmp_path: Path, sampling: s
     )
 
 
-def test_the_name_is_the_second_line_and_the_version_the_file(tmp_path: Path) -> None:
+def test_the_name_is_the_second_line_and_the_version_follows_from_the_file(tmp_path: Path) -> None:
     motion = read_at2(written(tmp_path))
     assert motion.name == "Somewhere, 1/2/2003, Station, 90"
     assert motion.version.startswith("file some.AT2, digest ")
@@ -65,7 +65,7 @@ def test_windows_line_ends_are_read(tmp_path: Path) -> None:
     interval=st.sampled_from([0.005, 0.01, 0.02, 1 / 128]),
     columns=st.integers(1, 8),
 )
-def test_any_wrapping_gives_the_values_back(
+def test_values_are_read_with_any_wrapping_of_lines(
     tmp_path: Path, values: list[float], interval: float, columns: int
 ) -> None:
     rows = [values[i : i + columns] for i in range(0, len(values), columns)]
@@ -98,7 +98,7 @@ def test_a_wrong_sampling_line_is_named(tmp_path: Path, sampling: str, words: st
 
 
 @pytest.mark.parametrize("units", ["ACCELERATION IN UNITS OF CM/S**2", "UNITS OF GAL", "UNITS OF G/10", ""])
-def test_only_g_is_taken(tmp_path: Path, units: str) -> None:
+def test_only_records_in_g_are_accepted(tmp_path: Path, units: str) -> None:
     with pytest.raises(InputError, match=r"some\.AT2:3 does not say UNITS OF G"):
         read_at2(written(tmp_path, units=units))
 

@@ -37,12 +37,12 @@ def test_the_unit_of_the_header_is_applied(tmp_path: Path, unit: str, factor: fl
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", " , "])
-def test_commas_semicolons_and_tabs_part_the_columns(tmp_path: Path, separator: str) -> None:
+def test_commas_semicolons_and_tabs_separate_the_columns(tmp_path: Path, separator: str) -> None:
     text = f"time (s),acceleration (g)\n{ROWS}".replace(",", separator)
     assert read_csv(written(tmp_path, text)).points == 3
 
 
-def test_comments_empty_lines_quotes_and_byte_order_marks_do_no_harm(tmp_path: Path) -> None:
+def test_comments_empty_lines_quotes_and_byte_order_marks_are_accepted(tmp_path: Path) -> None:
     text = f'\ufeff# station 7\n\n"time","acceleration (g)"\n# shaking\n{ROWS}\n\n'
     assert read_csv(written(tmp_path, text)).points == 3
 
@@ -53,7 +53,7 @@ def test_a_record_that_does_not_begin_at_zero_keeps_its_interval(tmp_path: Path)
     assert motion.points == 3
 
 
-def test_times_rounded_when_written_are_even(tmp_path: Path) -> None:
+def test_rounded_times_count_as_equally_spaced(tmp_path: Path) -> None:
     rows = "".join(f"{k / 128:.4f},{k % 3}\n" for k in range(257))
     motion = read_csv(written(tmp_path, f"time (s),acceleration (g)\n{rows}"))
     assert motion.interval == pytest.approx(1 / 128, rel=1e-12)
@@ -97,7 +97,7 @@ HEADER = "time (s),acceleration (g)\n"
         (HEADER + "0.0,1\n0.02,1\n0.04,1\n0.08,1\n0.10,1\n", "mine.csv:5 comes 0.04 s after.*it is 0.02 s"),
     ],
 )
-def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, text: str, words: str) -> None:
+def test_an_error_in_a_csv_record_is_named_with_its_line(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read_csv(written(tmp_path, text))
 
@@ -121,7 +121,7 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, text: str, words: 
         ("% a remark\n// another\ntime,ground_acceleration_g\n" + ROWS, 9.80665),
     ],
 )
-def test_columns_of_many_shapes_are_read(tmp_path: Path, text: str, factor: float) -> None:
+def test_columns_in_many_layouts_are_read(tmp_path: Path, text: str, factor: float) -> None:
     motion = read_csv(written(tmp_path, text))
     assert motion.interval == pytest.approx(0.02, rel=1e-12)
     np.testing.assert_allclose(motion.acceleration, factor * np.array([0.0, 1.5, -2.5]), rtol=1e-15)
@@ -135,7 +135,7 @@ def test_one_column_takes_its_interval_from_the_plan(tmp_path: Path, text: str) 
     assert (motion.interval, motion.acceleration.tolist()) == (0.01, [0.0, 1.5, -2.5])
 
 
-def test_what_the_plan_says_must_be_what_the_file_says(tmp_path: Path) -> None:
+def test_interval_and_unit_of_the_plan_must_agree_with_the_file(tmp_path: Path) -> None:
     path = written(tmp_path, "time,acc (g)\n" + ROWS)
     assert read_csv(path, dt=0.02, unit="g").points == 3
     assert read_csv(written(tmp_path, ROWS), unit="gal").peak == pytest.approx(0.025)

@@ -16,7 +16,7 @@ def test_the_properties_follow_from_the_samples() -> None:
     assert motion().duration == pytest.approx(0.06)
 
 
-def test_the_description_tells_versions_apart() -> None:
+def test_the_description_distinguishes_versions_of_a_record() -> None:
     assert motion().describe() == "Here (file here.csv), dt 0.02 s, 4 points, PGA 0.3188 g"
     assert (
         motion().scaled(0.1).describe()
@@ -24,7 +24,7 @@ def test_the_description_tells_versions_apart() -> None:
     )
 
 
-def test_scaling_leaves_the_original_alone() -> None:
+def test_scaling_does_not_change_the_original_motion() -> None:
     original = motion()
     scaled = original.scaled(-2.0)
     np.testing.assert_array_equal(scaled.acceleration, -2.0 * original.acceleration)
@@ -32,7 +32,7 @@ def test_scaling_leaves_the_original_alone() -> None:
     assert original.scaled(1.0).describe() == original.describe()
 
 
-def test_a_motion_cannot_be_changed() -> None:
+def test_a_ground_motion_is_immutable() -> None:
     samples = np.array([1.0, 2.0])
     fixed = GroundMotion("Here", "test", 0.02, samples)
     samples[0] = 9.0

@@ -51,7 +51,7 @@ def test_counts_become_accelerations_without_the_offset(tmp_path: Path) -> None:
     assert motion.acceleration.mean() == pytest.approx(0.0, abs=1e-15)
 
 
-def test_the_name_tells_station_direction_and_event(tmp_path: Path) -> None:
+def test_the_name_contains_station_direction_and_event(tmp_path: Path) -> None:
     motion = read_knet(written(tmp_path))
     assert motion.name == "MYG002 N-S, 2006/01/18 23:25:00"
     assert motion.version.startswith("file MYG0020601182325.NS, digest ")

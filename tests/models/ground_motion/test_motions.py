@@ -37,7 +37,7 @@ def test_el_centro_is_the_version_with_1559_points_after_a_zero(tmp_path: Path) 
     )
 
 
-def test_the_note_of_origin_and_the_registry_agree() -> None:
+def test_the_note_on_the_records_origin_and_the_registry_agree() -> None:
     note = (FOLDER / "ORIGIN.md").read_text(encoding="utf-8")
     data = {path.name for path in FOLDER.iterdir() if path.suffix != ".md"}
     assert data == {shipped.file for shipped in MOTIONS.values()}
@@ -97,14 +97,14 @@ def test_an_unknown_format_is_refused(tmp_path: Path, content: bytes) -> None:
 
 
 @pytest.mark.parametrize("suffix", [*READERS, ".txt"])
-def test_no_content_gets_past_a_reader_unnamed(tmp_path: Path, suffix: str) -> None:
+def test_a_message_about_wrong_contents_names_the_file(tmp_path: Path, suffix: str) -> None:
     for content in (b"", b"\n", b"a,b\n1,2\n", bytes(range(256))):
         (tmp_path / f"a{suffix}").write_bytes(content)
         with pytest.raises(InputError, match=re.escape(f"a{suffix}")):
             load(f"a{suffix}", tmp_path)
 
 
-def test_a_missing_record_lists_the_shipped_ones_and_the_nearest(tmp_path: Path) -> None:
+def test_a_missing_record_is_refused_with_the_shipped_ones_and_the_nearest_name(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         load("elcentro_1940", tmp_path)
     message = str(caught.value)
@@ -113,7 +113,7 @@ def test_a_missing_record_lists_the_shipped_ones_and_the_nearest(tmp_path: Path)
     assert message.endswith("did you mean el_centro_1940_ns?")
 
 
-def test_a_record_like_none_gets_no_guess(tmp_path: Path) -> None:
+def test_a_record_name_unlike_any_other_gets_no_suggestion(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"one of el_centro_1940_ns.*\.$"):
         load("zzz.at2", tmp_path)
 
@@ -138,7 +138,7 @@ SHARED = settings(
     st.sampled_from(BEGINNINGS),
     st.sampled_from(["csv", "txt", "dat", "at2", "ns"]),
 )
-def test_whatever_a_file_holds_only_a_sentence_comes_out(
+def test_any_file_is_read_or_refused_in_one_sentence(
     tmp_path: Path, content: bytes, begin: bytes, suffix: str
 ) -> None:
     (tmp_path / f"a.{suffix}").write_bytes(begin + content)
@@ -152,7 +152,7 @@ def test_whatever_a_file_holds_only_a_sentence_comes_out(
         assert motion.interval >= 1e-6
 
 
-def test_a_record_that_says_its_interval_and_unit_is_not_told_others(tmp_path: Path) -> None:
+def test_a_record_that_states_interval_and_unit_refuses_others(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="come every 0.02 s, and dt in .ground_motion. is 0.01 s"):
         load("el_centro_1940_ns", tmp_path, 0.01)
     with pytest.raises(InputError, match="says its unit itself: leave out unit"):

@@ -30,7 +30,7 @@ def rms(values: Array) -> float:
 
 @settings(deadline=None)
 @given(values=samples, ratio=st.integers(1, 12))
-def test_original_samples_are_met_and_lines_join_them(values: Array, ratio: int) -> None:
+def test_resampling_keeps_the_original_samples_and_joins_them_by_lines(values: Array, ratio: int) -> None:
     interval = 0.02 / ratio
     got = resample(motion(values), interval, 0.02 * (values.size - 1))
     assert got.size == ratio * (values.size - 1) + 1
@@ -45,14 +45,14 @@ def test_intervals_that_do_not_divide_each_other_are_interpolated() -> None:
     np.testing.assert_allclose(got, [0.0, 2.0, 1.0, -3.0], atol=1e-12)
 
 
-def test_the_end_goes_to_zero_within_one_interval_of_the_record() -> None:
+def test_the_motion_ends_at_zero_within_one_interval_of_the_record() -> None:
     got = resample(motion(np.array([1.0, 2.0])), 0.005, 0.06)
     np.testing.assert_allclose(got, [1, 1.25, 1.5, 1.75, 2, 1.5, 1, 0.5, 0, 0, 0, 0, 0], atol=1e-12)
 
 
 @settings(deadline=None)
 @given(values=samples, duration=st.floats(0.0, 3.0))
-def test_the_length_is_that_of_the_test(values: Array, duration: float) -> None:
+def test_the_resampled_motion_has_the_length_of_the_test(values: Array, duration: float) -> None:
     got = resample(motion(values), INTERVAL, duration)
     assert got.size == round(duration / INTERVAL) + 1
     assert np.abs(got).max() <= np.abs(values).max()
@@ -69,7 +69,7 @@ def test_the_integration_is_exact_for_straight_lines(values: Array) -> None:
     np.testing.assert_allclose(displacement, lines.antiderivative(2)(times), rtol=0.0, atol=1e-9)
 
 
-def test_the_displacement_meets_the_closed_form_of_a_wave_train() -> None:
+def test_the_displacement_agrees_with_the_closed_form_of_a_wave_train() -> None:
     amplitude, omega, length = 0.05, 2.0 * np.pi * 1.5, 20.0  # m, rad/s, s
     t = np.linspace(0.0, length, round(length / INTERVAL) + 1)
     slow = np.pi / length
@@ -88,13 +88,13 @@ def test_the_displacement_meets_the_closed_form_of_a_wave_train() -> None:
 
 @settings(deadline=None)
 @given(offset=st.floats(-1.0, 1.0), slope=st.floats(-0.1, 0.1))
-def test_an_acceleration_that_is_all_drift_moves_nothing(offset: float, slope: float) -> None:
+def test_an_acceleration_of_drift_only_gives_no_displacement(offset: float, slope: float) -> None:
     got = ground_displacement(np.linspace(offset, offset + 10.0 * slope, 5001), INTERVAL)
     np.testing.assert_allclose(got, 0.0, atol=1e-11)
 
 
 @pytest.mark.parametrize("order", range(5))
-def test_drift_on_top_of_a_record_changes_nothing(order: int, tmp_path: Path) -> None:
+def test_drift_added_to_a_record_does_not_change_its_displacement(order: int, tmp_path: Path) -> None:
     record = load("el_centro_1940_ns", tmp_path).acceleration
     fine = resample(motion(record), INTERVAL, 31.18)
     s = np.linspace(0.0, 1.0, fine.size)
@@ -104,7 +104,7 @@ def test_drift_on_top_of_a_record_changes_nothing(order: int, tmp_path: Path) ->
 
 @settings(deadline=None)
 @given(values=samples, quiet=st.integers(1, 300))
-def test_any_motion_begins_and_ends_at_rest_with_a_smooth_correction(values: Array, quiet: int) -> None:
+def test_a_corrected_motion_begins_and_ends_at_rest(values: Array, quiet: int) -> None:
     moving = round((values.size + 1) * 0.02 / INTERVAL)
     acceleration = resample(motion(values), INTERVAL, (moving + quiet) * INTERVAL)
     got = ground_displacement(acceleration, INTERVAL)
@@ -154,7 +154,7 @@ def test_el_centro_at_full_scale_moves_as_far_as_published(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("duration", [2.0, 10.0, 31.2, 40.0, 90.0])
-def test_the_motion_does_not_depend_on_the_length_of_the_test(duration: float, tmp_path: Path) -> None:
+def test_the_displacement_does_not_depend_on_the_length_of_the_test(duration: float, tmp_path: Path) -> None:
     record = load("el_centro_1940_ns", tmp_path)
     rows = ground(record, INTERVAL, duration)
     assert rows.shape == (2, round(duration / INTERVAL) + 1)

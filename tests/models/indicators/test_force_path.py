@@ -1,4 +1,4 @@
-"""Delay and gain of a force against forces shifted on purpose."""
+"""The estimated delay and gain of a force, tested with forces of known delay and gain."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def times(ticks: int) -> Array:
 
 
 def motion(t: Array) -> Array:
-    """An earthquake's worth of sines around 2 Hz that swell and fade, written out for any time."""
+    """A sum of sines around 2 Hz that grow and decay, at any time."""
     draws = np.random.default_rng(5)
     f, phase = draws.normal(2.0, 0.5, 40), draws.uniform(0.0, 6.28, 40)
     envelope = np.exp(-(((t - 12.0) / 8.0) ** 2))
@@ -44,7 +44,7 @@ def test_a_known_delay_and_gain_are_found(delay: float, seconds: float) -> None:
     assert found.interval[0] <= found.delay <= found.interval[1]
 
 
-def test_the_interval_holds_the_truth_as_often_as_it_says() -> None:
+def test_the_interval_covers_the_true_delay_as_often_as_stated() -> None:
     """Of 200 draws of noise 95 % within three standard errors of such a count."""
     t = times(20_000)
     expected, measured = motion(t), motion(t - 0.002)
@@ -60,8 +60,8 @@ def test_the_interval_holds_the_truth_as_often_as_it_says() -> None:
 
 @pytest.mark.parametrize("ticks", [0, 8, -8, 40])
 @pytest.mark.parametrize("case", [1, 4])
-def test_it_bears_the_noise_of_a_specimen_with_mass(ticks: int, case: int) -> None:
-    """The benchmark's readings: twice differentiated, the displacement's noise is twenty times the force."""
+def test_the_force_delay_is_found_under_the_noise_of_a_specimen_with_mass(ticks: int, case: int) -> None:
+    """With the benchmark's readings the displacement's noise, differentiated twice, is twenty times the force."""
     on = stage(CASES[case - 1], EL_CENTRO, 0, 1)
     plan = with_compensator(on.plants[0], SETTINGS["amb"])
     _, rollout = play(on, "amb", plan)
@@ -73,14 +73,14 @@ def test_it_bears_the_noise_of_a_specimen_with_mass(ticks: int, case: int) -> No
     assert found.gain == pytest.approx(1.0, abs=5e-3)
 
 
-def test_a_dashpot_that_the_plan_lacks_is_a_lead() -> None:
+def test_a_dashpot_that_the_plan_lacks_appears_as_a_lead() -> None:
     t = times(20_000)
     x = motion(t)
     found = indicators.force_path(x, x + 0.003 * np.gradient(x, DT), DT)
     assert found.delay == pytest.approx(-0.003, rel=0.01)
 
 
-def test_the_column_of_a_plan_is_played_over_the_measured_displacement() -> None:
+def test_the_planned_columns_force_is_computed_from_the_measured_displacement() -> None:
     plan = Plan()
     x = motion(times(5000)) / 12.5e6
     found = force_path(plan, x, np.roll(plan.column.stiffness * x, 3))
@@ -92,7 +92,7 @@ def test_the_column_of_a_plan_is_played_over_the_measured_displacement() -> None
 @pytest.mark.parametrize("seconds", [10.0, 40.0])
 @pytest.mark.parametrize("width", [0.1, 0.4, 1.0, 3.0])
 def test_unrelated_noise_under_the_same_burst_is_refused(width: float, seconds: float) -> None:
-    """One strong block is coherent with anything."""
+    """A single strong block would appear coherent with any signal."""
     t = times(round(seconds / DT))
     for seed in range(10):
         burst = np.exp(-0.5 * ((t - 4.0 - 0.1 * seed) / width) ** 2)
@@ -103,7 +103,7 @@ def test_unrelated_noise_under_the_same_burst_is_refused(width: float, seconds: 
 
 @pytest.mark.parametrize("place", [0, 1000, 4900])
 def test_a_pulse_within_one_block_is_refused(place: int) -> None:
-    """No block vouches for another."""
+    """No other block confirms the estimate."""
     pulse = np.zeros(5000)
     pulse[place : place + 40] = 1e3 * np.hanning(40)
     with pytest.raises(InputError, match="or only for a moment"):
@@ -111,7 +111,7 @@ def test_a_pulse_within_one_block_is_refused(place: int) -> None:
     assert force_path(Plan(), pulse / 12.5e6, np.roll(pulse, 3)) is None
 
 
-def test_what_says_nothing_is_refused() -> None:
+def test_signals_without_information_are_refused() -> None:
     t = times(5000)
     with pytest.raises(InputError, match="coherent with that of the specimen's model at no frequency"):
         indicators.force_path(motion(t), noisy(0.0 * t, 1.0, 3), DT)

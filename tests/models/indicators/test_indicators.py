@@ -26,21 +26,21 @@ def chirp(delay: float = 0.0) -> Array:
 
 
 def drifting(seconds: float, delay: float) -> Array:
-    """A vibration at 2 Hz on a drift that takes a minute, as a floor moves over ground that moves."""
+    """A vibration at 2 Hz on a drift over one minute, as of a floor above a moving ground."""
     t = np.arange(0.0, seconds, DT) - delay
     return np.asarray(0.05 * np.sin(2.0 * np.pi * t / 60.0) + 0.003 * np.sin(4.0 * np.pi * t))
 
 
 class TestTracking:
     @pytest.mark.parametrize("delay", [-0.031, -0.0012, 0.0, 0.0005, 0.012, 0.044, 0.15])
-    def test_a_known_delay_is_found_both_ways(self, delay: float) -> None:
+    def test_a_known_delay_or_lead_is_found(self, delay: float) -> None:
         assert indicators.correlation_delay(chirp(), chirp(delay), DT) == pytest.approx(delay, abs=2e-5)
         if abs(delay) < 0.1:
             found = indicators.frequency_evaluation_index(chirp(), 1.1 * chirp(delay), DT)
             assert found.delay == pytest.approx(delay, rel=0.03, abs=1e-5)
 
     @given(amplitude=st.floats(0.2, 3.0), phase=st.floats(-2.5, 2.5), frequency=st.floats(0.5, 8.0))
-    def test_the_index_of_a_sine_is_its_amplitude_and_phase(
+    def test_the_frequency_index_of_a_sine_gives_its_amplitude_and_phase(
         self, amplitude: float, phase: float, frequency: float
     ) -> None:
         turn = 2.0 * np.pi * frequency * np.arange(0.0, 20.0, DT)
@@ -49,14 +49,14 @@ class TestTracking:
         assert found.frequency == pytest.approx(frequency, rel=1e-3)
         assert found.delay == pytest.approx(phase / (2.0 * np.pi * frequency), rel=2e-3, abs=1e-6)
 
-    def test_the_area_is_that_of_the_ellipse_and_has_the_sign_of_the_lag(self) -> None:
+    def test_the_synchronization_area_is_that_of_the_ellipse_with_the_sign_of_the_lag(self) -> None:
         turn = np.linspace(0.0, 2.0 * np.pi, 5001)
         area = indicators.tracking_indicator(np.sin(turn), np.sin(turn - 0.3))
         assert area[-1] == pytest.approx(np.pi * math.sin(0.3), rel=1e-6)
         assert indicators.tracking_indicator(np.sin(turn), np.sin(turn + 0.3))[-1] == pytest.approx(-area[-1])
 
     @given(scale=st.floats(1e-6, 1e6), error=st.floats(-2.0, 2.0))
-    def test_relative_errors_are_relative(self, scale: float, error: float) -> None:
+    def test_relative_errors_do_not_depend_on_the_scale(self, scale: float, error: float) -> None:
         reference = scale * chirp()
         values = (1.0 + error) * reference
         assert indicators.nrmse(reference, values) == pytest.approx(abs(error), abs=1e-12)
@@ -71,11 +71,13 @@ class TestTracking:
         assert indicators.correlation_delay(target, measured, DT) == pytest.approx(delay, abs=2e-4)
 
     @pytest.mark.parametrize("delay", [0.0, 0.004, 0.04, 0.098])
-    def test_the_benchmarks_delay_is_that_of_the_best_whole_tick(self, delay: float) -> None:
+    def test_the_benchmarks_delay_is_the_whole_tick_of_largest_correlation(self, delay: float) -> None:
         assert indicators.correlation_lag(chirp(), chirp(delay), DT) == pytest.approx(delay, abs=1e-12)
 
     @pytest.mark.parametrize("seed", [1, 2, 3])
-    def test_correlations_of_all_lags_are_the_coefficients_of_what_overlaps(self, seed: int) -> None:
+    def test_correlations_of_all_lags_are_the_coefficients_of_the_overlapping_samples(
+        self, seed: int
+    ) -> None:
         rng = np.random.default_rng(seed)
         target = rng.normal(size=300).cumsum() + 40.0
         measured = 3.0 * np.roll(target, 11) + rng.normal(size=300)
@@ -86,12 +88,12 @@ class TestTracking:
         ]
         assert found == pytest.approx(wanted, abs=1e-9)
 
-    def test_what_does_not_move_correlates_with_nothing(self) -> None:
+    def test_a_constant_signal_has_zero_correlation(self) -> None:
         target = np.concatenate([np.full(100, 2.0), np.sin(np.arange(20.0))])
         measured = np.concatenate([np.cos(np.arange(20.0)), np.full(100, 1.0)])
         assert np.all(tracking.correlations(target, measured, 90, 110) == 0.0)
 
-    def test_the_benchmarks_delay_knows_no_lead_and_an_end(self) -> None:
+    def test_the_benchmarks_delay_is_never_a_lead_and_has_an_upper_bound(self) -> None:
         assert indicators.correlation_lag(chirp(), chirp(-0.01), DT) == 0.0
         assert indicators.correlation_lag(chirp(), chirp(0.03), DT, ticks=10) == pytest.approx(9 * DT)
         with pytest.raises(InputError, match="50 ticks are too few for 50 delays: give at least 51"):
@@ -99,9 +101,7 @@ class TestTracking:
 
     @pytest.mark.parametrize("seconds", [2.0, 5.0, 12.0, 40.0])
     @pytest.mark.parametrize("delay", [-0.012, 0.0189, 0.044])
-    def test_a_motion_on_a_slow_drift_has_its_delay_however_short_it_is(
-        self, seconds: float, delay: float
-    ) -> None:
+    def test_the_delay_of_a_short_motion_on_a_slow_drift_is_found(self, seconds: float, delay: float) -> None:
         target, measured = (drifting(seconds, late) for late in (0.0, delay))
         found = indicators.aligned_evaluation(target, measured, DT)
         plain = indicators.frequency_evaluation_index(target, measured, DT)
@@ -111,11 +111,11 @@ class TestTracking:
         correlation = indicators.correlation_delay(target, measured, DT)
         assert indicators.tracking_delay(found.delay, correlation, DT) == found.delay
 
-    def test_two_estimates_that_differ_determine_no_delay(self) -> None:
+    def test_two_different_estimates_give_no_delay(self) -> None:
         assert indicators.tracking_delay(0.0164, 0.0189, DT) is None
         assert indicators.tracking_delay(0.0188, 0.0189, DT) == 0.0188
 
-    def test_a_delay_beyond_the_search_is_said(self) -> None:
+    def test_a_delay_beyond_the_search_range_is_reported(self) -> None:
         with pytest.raises(InputError, match="not within ±0.02 s"):
             indicators.correlation_delay(chirp(), chirp(0.15), DT, most=0.02)
 
@@ -133,11 +133,11 @@ class TestDamping:
             (0.044, -1.5),
         ],
     )
-    def test_apparent_damping_is_the_published_one(self, delay: float, percent: float) -> None:
+    def test_apparent_damping_agrees_with_the_published_value(self, delay: float, percent: float) -> None:
         found = 100.0 * indicators.apparent_damping(M, C, K, K / 4.0, 1.0, delay)
         assert found == pytest.approx(percent, abs=0.06 if percent < 0.0 else 0.02)
 
-    def test_the_equivalent_agrees_for_small_delays(self) -> None:
+    def test_the_equivalent_damping_agrees_for_small_delays(self) -> None:
         lost, softer = indicators.damping_equivalent(K / 4.0, 1.0, 0.001, OMEGA)
         points = indicators.damping_points(lost, M, K)
         assert 100.0 * points == pytest.approx(0.156, abs=0.001)
@@ -146,7 +146,9 @@ class TestDamping:
         assert 0.05 - root == pytest.approx(points, rel=0.02)
 
     @given(ratio=st.floats(-0.03, 0.2), frequency=st.floats(0.7, 6.0), phase=st.floats(0.0, 6.0))
-    def test_a_free_vibration_is_read(self, ratio: float, frequency: float, phase: float) -> None:
+    def test_the_damping_of_a_free_vibration_is_estimated(
+        self, ratio: float, frequency: float, phase: float
+    ) -> None:
         t = np.arange(0.0, 5.0, DT)
         natural = 2.0 * np.pi * frequency
         signal = np.exp(-ratio * natural * t) * np.cos(natural * math.sqrt(1 - ratio**2) * t + phase)
@@ -157,7 +159,7 @@ class TestDamping:
 
 
 class TestEnergy:
-    def test_a_late_spring_puts_in_what_its_loop_encloses(self) -> None:
+    def test_the_error_energy_of_a_delayed_spring_is_the_area_of_its_loop(self) -> None:
         turn = np.linspace(0.0, 20.0 * np.pi, 50_001)
         target, measured = np.sin(turn), np.sin(turn - 0.1)
         force = 2.0 * measured
@@ -180,7 +182,9 @@ BENCHMARK = 1e6 * np.array(
 
 class TestStability:
     @pytest.mark.parametrize(("share", "ms"), [(0.25, 32.9), (0.5, 16.1), (0.75, 10.7), (1.0, 8.0)])
-    def test_the_papers_building(self, share: float, ms: float) -> None:
+    def test_the_critical_delay_of_the_papers_building_agrees_with_the_published_one(
+        self, share: float, ms: float
+    ) -> None:
         found = indicators.critical_delay(one(M), one(C), one((1 - share) * K), np.ones(1), share * K)
         assert 1e3 * found == pytest.approx(ms, abs=0.06)
 
@@ -188,7 +192,9 @@ class TestStability:
         ("mass", "ratio", "ms"),
         [(1000.0, 0.05, 14.65), (1100.0, 0.04, 12.23), (1300.0, 0.03, 9.92), (1000.0, 0.03, 8.73)],
     )
-    def test_the_2020_benchmark_problem(self, mass: float, ratio: float, ms: float) -> None:
+    def test_the_force_delays_of_the_2020_benchmark_problem_agree_with_the_published_ones(
+        self, mass: float, ratio: float, ms: float
+    ) -> None:
         """Force delay of cases C1 to C4: Silva, Gomez, Maghareh, Dyke and Spencer, MSSP (2020)."""
         whole = mass * np.eye(3)
         values, vectors = np.linalg.eigh(BENCHMARK / mass)
@@ -218,7 +224,7 @@ class TestStability:
         assert roots[2] < 0.0
 
     @pytest.mark.parametrize("n", [2, 5, 12, 20, 30])
-    def test_many_storeys_agree_with_a_scan_over_frequency(self, n: int) -> None:
+    def test_the_critical_delay_of_many_storeys_agrees_with_a_scan_over_frequency(self, n: int) -> None:
         ones = np.ones(n)
         mass, _, whole = shear_building.matrices(1e5 * ones, 1e8 * ones, ones)
         direction = np.eye(n)[n // 2] - np.eye(n)[n // 2 - 1]
@@ -234,7 +240,7 @@ class TestStability:
         found = indicators.critical_delay(mass, damping, numerical, direction, 4e7)
         assert found == pytest.approx(scanned, rel=2e-3)
 
-    def test_a_specimen_heavier_than_the_numerical_part_bears_no_delay(self) -> None:
+    def test_a_specimen_heavier_than_the_numerical_part_tolerates_no_delay(self) -> None:
         heavy = indicators.critical_delay(one(M), one(C), one(K), np.ones(1), K, 0.0, 2.0 * M)
         assert heavy == 0.0
         assert indicators.predictive_stability_indicator(heavy) == -math.inf
@@ -247,10 +253,10 @@ class TestStability:
         with pytest.raises(InputError, match="singular"):
             indicators.critical_delay(one(0.0), one(C), one(K), np.ones(1), K)
 
-    def test_a_small_share_bears_any_delay(self) -> None:
+    def test_a_specimen_with_a_small_share_tolerates_any_delay(self) -> None:
         assert indicators.critical_delay(one(M), one(C), one(0.95 * K), np.ones(1), 0.05 * K) == math.inf
 
-    def test_the_indicator_and_its_words(self) -> None:
+    def test_the_stability_indicator_has_its_value_and_its_class(self) -> None:
         assert indicators.predictive_stability_indicator(0.01) == pytest.approx(1.0)
         assert [indicators.sensitivity(x) for x in (1.5, 0.3, -0.1)] == [
             "slightly",
@@ -268,7 +274,7 @@ class TestStability:
         ((np.zeros(900), chirp()[:900]), "zero throughout|constant"),
     ],
 )
-def test_signals_that_say_nothing_are_refused(signals: tuple[Array, Array], sentence: str) -> None:
+def test_signals_without_motion_are_refused(signals: tuple[Array, Array], sentence: str) -> None:
     for call in (
         lambda: indicators.nrmse(*signals),
         lambda: indicators.peak_error(*signals),

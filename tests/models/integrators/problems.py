@@ -1,4 +1,4 @@
-"""Linear structures that the methods of integration are tried on, their exact motion, and the list of methods."""
+"""Linear structures for tests of the integration methods, their exact motion, and the list of methods."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Integration methods as they are built: what the registry holds, and what is refused."""
+"""The construction of integration methods: the contents of the registry, and refused arguments."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class TestRegistry:
         assert sorted(method.code for method in INTEGRATORS.values()) == list(range(len(INTEGRATORS)))
 
     @EVERY
-    def test_coefficients_are_what_one_compiled_version_takes(
+    def test_the_coefficients_of_every_method_fit_one_compiled_version(
         self, name: str, options: dict[str, float]
     ) -> None:
         problem = three()
@@ -38,7 +38,7 @@ class TestRegistry:
         assert c.flags.c_contiguous
 
     @EVERY
-    def test_dispatch_equals_the_method_itself(self, name: str, options: dict[str, float]) -> None:
+    def test_dispatch_by_code_equals_the_method_itself(self, name: str, options: dict[str, float]) -> None:
         problem = three()
         method = integrators.build(name, problem.M, problem.C, problem.K, 0.002, **options)
         one = np.random.default_rng(5).standard_normal((ROWS, 3))
@@ -49,7 +49,7 @@ class TestRegistry:
         assert g.tolist() == [1e4, -2e4, 3e4]
 
     @EVERY
-    def test_motion_is_in_equilibrium_and_the_next_becomes_the_present(
+    def test_the_motion_is_continuous_and_in_equilibrium_at_every_tick(
         self, name: str, options: dict[str, float]
     ) -> None:
         problem = three()
@@ -61,7 +61,9 @@ class TestRegistry:
             np.testing.assert_allclose(inertia, g, atol=1e-6, rtol=1e-9)
 
     @EVERY
-    def test_the_first_step_finds_the_start(self, name: str, options: dict[str, float]) -> None:
+    def test_the_first_state_of_the_march_is_the_initial_state(
+        self, name: str, options: dict[str, float]
+    ) -> None:
         problem = three()
         first = march(problem, name, 0.002, **options)[0]
         np.testing.assert_array_equal(first[DISPLACEMENT], problem.x0)
@@ -77,7 +79,7 @@ class TestRegistry:
         assert not s.any()
 
     @EVERY
-    def test_storeys_apart_move_as_single_ones(self, name: str, options: dict[str, float]) -> None:
+    def test_uncoupled_storeys_move_as_single_ones(self, name: str, options: dict[str, float]) -> None:
         one = single()
         two = Problem(
             one.M * np.eye(2),
@@ -95,13 +97,13 @@ class TestRegistry:
 
 
 class TestBuild:
-    def test_unknown_method(self) -> None:
+    def test_an_unknown_method_is_refused(self) -> None:
         problem = single()
         with pytest.raises(InputError, match="did you mean kr_alpha"):
             integrators.build("kr_alfa", problem.M, problem.C, problem.K, 0.002)
 
     @pytest.mark.parametrize("rho", [-0.1, 1.1, math.nan])
-    def test_spectral_radius_out_of_range(self, rho: float) -> None:
+    def test_a_spectral_radius_out_of_range_is_refused(self, rho: float) -> None:
         problem = single()
         with pytest.raises(InputError, match="at least 0 and at most 1"):
             integrators.build("kr_alpha", problem.M, problem.C, problem.K, 0.002, rho)

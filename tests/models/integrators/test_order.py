@@ -39,7 +39,7 @@ from tests.models.integrators.problems import (
 class TestOrder:
     @EVERY
     @pytest.mark.parametrize("problem", [single(), three()], ids=["one", "three"])
-    def test_displacement_velocity_and_acceleration(
+    def test_displacement_velocity_and_acceleration_have_their_order_of_accuracy(
         self, name: str, options: dict[str, float], problem: Problem
     ) -> None:
         errors: dict[str, list[float]] = {"x": [], "v": [], "a": [], "next": []}
@@ -57,7 +57,9 @@ class TestOrder:
             assert min(orders(values)[1:]) > INTEGRATORS[name].order - 0.15, (quantity, values)
 
     @EVERY
-    def test_reference_is_that_of_an_adaptive_solver_too(self, name: str, options: dict[str, float]) -> None:
+    def test_the_exact_solution_agrees_with_an_adaptive_solver(
+        self, name: str, options: dict[str, float]
+    ) -> None:
         problem = three()
         interval, n = 0.0005, 3
         states = march(problem, name, interval, **options)
@@ -76,7 +78,7 @@ class TestOrder:
         np.testing.assert_allclose(states[:, DISPLACEMENT], solution.y[:n].T, atol=atol, rtol=0)
 
     @EVERY
-    def test_the_estimated_next_velocity_is_of_second_order_within_one_step(
+    def test_the_estimated_next_velocity_is_second_order_within_one_step(
         self, name: str, options: dict[str, float]
     ) -> None:
         problem = three()
@@ -103,7 +105,7 @@ class TestOrder:
 
 class TestEquivalences:
     @pytest.mark.parametrize("problem", [single(), three()], ids=["one", "three"])
-    def test_central_difference_and_explicit_newmark(self, problem: Problem) -> None:
+    def test_central_difference_and_explicit_newmark_are_equivalent(self, problem: Problem) -> None:
         one = march(problem, "newmark_explicit", 0.002)
         other = march(problem, "central_difference", 0.002)
         for row, share in ((DISPLACEMENT, 1e-10), (VELOCITY, 1e-9), (ACCELERATION, 1e-7)):
@@ -111,7 +113,7 @@ class TestEquivalences:
             np.testing.assert_allclose(one[:, row], other[:, row], atol=share * largest, rtol=0)
 
     @pytest.mark.parametrize("problem", [single(), three()], ids=["one", "three"])
-    def test_kr_alpha_without_numerical_damping_and_cr(self, problem: Problem) -> None:
+    def test_kr_alpha_without_numerical_damping_equals_cr(self, problem: Problem) -> None:
         one = march(problem, "cr", 0.002)
         other = march(problem, "kr_alpha", 0.002, rho_infinity=1.0)
         for row in range(NEXT_VELOCITY + 1):
@@ -186,7 +188,9 @@ class TestYielding:
         return np.array(rows)
 
     @EVERY
-    def test_against_an_adaptive_solver(self, name: str, options: dict[str, float]) -> None:
+    def test_a_yielding_storey_agrees_with_an_adaptive_solver(
+        self, name: str, options: dict[str, float]
+    ) -> None:
         interval = 0.001
         times = np.arange(2001) * interval
         expected = self.reference(times)
@@ -197,7 +201,7 @@ class TestYielding:
 
 
 class TestRungeKutta:
-    def test_a_step_is_that_of_the_four_stages(self) -> None:
+    def test_a_runge_kutta_step_equals_its_four_stages(self) -> None:
         problem, h, n = three(), 0.004, 3
         inverse = np.linalg.inv(problem.M)
         load = np.array([3e5, -1e5, 2e5])  # held over the step
@@ -220,7 +224,7 @@ class TestRungeKutta:
             found = np.concatenate([s[NEXT_DISPLACEMENT], s[NEXT_VELOCITY]])
             np.testing.assert_allclose(found, z, rtol=1e-10, atol=1e-13)
 
-    def test_free_vibration_is_of_order_four(self) -> None:
+    def test_free_vibration_by_runge_kutta_is_fourth_order(self) -> None:
         problem = three()._replace(force=np.zeros(3))
         errors = []
         for interval in INTERVALS:
@@ -230,12 +234,14 @@ class TestRungeKutta:
         assert min(orders(errors)) > 3.85, errors
 
     @pytest.mark.parametrize("zeta", [0.0, 0.02, 0.1, 0.3, 0.5, 0.55, 0.7, 1.0])
-    def test_below_its_limit_it_is_stable_for_every_damping_ratio(self, zeta: float) -> None:
+    def test_runge_kutta_is_stable_below_its_limit_for_every_damping_ratio(self, zeta: float) -> None:
         assert (
             max(radius("rk4", share * INTEGRATORS["rk4"].limit, zeta) for share in (0.2, 0.6, 0.999)) <= 1.0
         )
 
-    def test_its_limit_is_sharp_near_half_and_that_without_damping_is_the_root_of_eight(self) -> None:
+    def test_runge_kuttas_limit_is_sharp_near_half_critical_damping_and_root_of_eight_without_damping(
+        self,
+    ) -> None:
         assert radius("rk4", 1.01 * INTEGRATORS["rk4"].limit, 0.54) > 1.0
         assert radius("rk4", 0.999 * math.sqrt(8.0)) < 1.0 < radius("rk4", 1.001 * math.sqrt(8.0))
 
@@ -260,14 +266,14 @@ class TestRungeKutta:
             sizes.append(np.abs(s[NEXT_DISPLACEMENT]).max())
         assert sizes[-1] > 1e3 * sizes[0]
 
-    def test_a_numerical_part_that_a_specimen_must_hold_is_none_that_the_step_makes_diverge(self) -> None:
+    def test_a_numerical_part_that_is_unstable_without_its_specimen_is_accepted(self) -> None:
         M, K = np.diag([1e3, 1e3]), np.array([[1e6, -1e6], [-1e6, 1e6]])
         for stiffness in (K, K - 1e5 * np.eye(2)):
             method = integrators.build("rk4", M, np.zeros((2, 2)), stiffness, 0.01)
             assert method.code == integrators.INTEGRATORS["rk4"].code
 
     @pytest.mark.parametrize("omega_h", [0.1, 0.2, 0.3])
-    def test_it_damps_low_modes_by_the_fifth_power(self, omega_h: float) -> None:
+    def test_runge_kutta_damps_low_modes_with_the_fifth_power_of_the_interval(self, omega_h: float) -> None:
         pole = poles("rk4", omega_h)[0]
         damping = -math.log(abs(pole)) / abs(np.angle(pole))
         assert damping == pytest.approx(omega_h**5 / 144.0, rel=0.02)

@@ -1,4 +1,4 @@
-"""Where integration methods are stable, and the poles of their amplification."""
+"""The stability limits of integration methods, and the poles of their amplification."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def generalised_alpha(rho: float, omega_h: float, zeta: float) -> Any:
 class TestStability:
     @pytest.mark.parametrize("name", SHARP)
     @pytest.mark.parametrize("zeta", [0.0, 0.05, 0.5])
-    def test_limit_of_the_bounded_methods(self, name: str, zeta: float) -> None:
+    def test_conditionally_stable_methods_have_their_stability_limit(self, name: str, zeta: float) -> None:
         limit = INTEGRATORS[name].limit
         assert radius(name, 0.999 * limit, zeta) <= 1.0 + 1e-9
         assert radius(name, 1.001 * limit, zeta) > 1.0 + 1e-4
@@ -53,13 +53,15 @@ class TestStability:
     @pytest.mark.parametrize(("name", "options"), ALWAYS)
     @pytest.mark.parametrize("zeta", [0.0, 0.02, 0.5])
     @pytest.mark.parametrize("omega_h", [0.1, 2.0, 50.0, 1e3])
-    def test_the_others_are_always_stable(
+    def test_the_other_methods_are_unconditionally_stable(
         self, name: str, options: dict[str, float], zeta: float, omega_h: float
     ) -> None:
         assert radius(name, omega_h, zeta, options) <= 1.0 + 1e-6
 
     @pytest.mark.parametrize(("name", "options"), ALWAYS)
-    def test_long_march_at_fifty(self, name: str, options: dict[str, float]) -> None:
+    def test_a_long_march_at_omega_h_of_fifty_stays_bounded(
+        self, name: str, options: dict[str, float]
+    ) -> None:
         # released from a deformation
         problem = single()._replace(force=np.zeros(1), v0=np.zeros(1))
         interval = 50.0 / math.sqrt(25e6 / 160e3)
@@ -83,7 +85,7 @@ class TestStability:
 
 class TestPoles:
     @pytest.mark.parametrize("rho", RHOS)
-    def test_kr_alpha_spectral_radius_at_infinity(self, rho: float) -> None:
+    def test_kr_alpha_has_the_given_spectral_radius_at_infinity(self, rho: float) -> None:
         # all three poles meet in −ρ, where eigenvalues are found to the cube root of rounding only
         assert radius("kr_alpha", 1e4, 0.0, {"rho_infinity": rho}) == pytest.approx(rho, abs=5e-3)
         own = np.poly(poles("kr_alpha", 1e6, 0.0, {"rho_infinity": rho})[:3])
@@ -99,7 +101,7 @@ class TestPoles:
         np.testing.assert_allclose(own, np.poly(generalised_alpha(rho, omega_h, zeta)), atol=1e-8)
 
     @pytest.mark.parametrize("omega_h", [0.1, 0.5, 1.5])
-    def test_period_of_the_explicit_methods(self, omega_h: float) -> None:
+    def test_the_explicit_methods_have_their_period_without_damping(self, omega_h: float) -> None:
         for name in SHARP:
             pair = poles(name, omega_h)[:2]
             np.testing.assert_allclose(np.abs(np.angle(pair)), 2.0 * math.asin(omega_h / 2.0), rtol=1e-9)

@@ -1,4 +1,4 @@
-"""The impaired link does what its parameters say, the same every time, each direction by itself."""
+"""The impaired link follows its parameters, is repeatable, and treats each direction independently."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INTERVAL = 0.002
 
 
 def fates(link: ImpairedLink, direction: str = "command", count: int = MESSAGES) -> list[float | None]:
-    """What becomes of the first messages."""
+    """The fates of the first messages: their extra delay, None where lost."""
     return [link.fate(direction, seq, seq * INTERVAL) for seq in range(count)]
 
 
@@ -47,13 +47,13 @@ def test_delays_have_the_mean_and_the_scatter_asked_for(delay: float, jitter: fl
 
 
 @pytest.mark.parametrize(("loss", "burst"), [(0.01, 1.0), (0.05, 4.0), (0.3, 2.0), (0.02, 20.0)])
-def test_losses_have_the_share_and_the_length_asked_for(loss: float, burst: float) -> None:
+def test_losses_have_the_share_and_the_burst_length_asked_for(loss: float, burst: float) -> None:
     lost = [fate is None for seed in range(4) for fate in fates(ImpairedLink(seed, loss=loss, burst=burst))]
     assert np.mean(lost) == pytest.approx(loss, rel=0.15)
     assert np.mean(runs(lost)) == pytest.approx(burst, rel=0.15)
 
 
-def test_heavy_losses_cannot_stand_alone() -> None:
+def test_heavy_losses_have_the_longer_bursts_that_their_share_requires() -> None:
     lost = [fate is None for fate in fates(ImpairedLink(0, loss=0.8, burst=1.0))]
     assert np.mean(lost) == pytest.approx(0.8, rel=0.03)
     assert np.mean(runs(lost)) == pytest.approx(4.0, rel=0.05)
@@ -66,7 +66,7 @@ def test_losses_do_not_depend_on_delays() -> None:
 
 
 @given(st.integers(0, 2**32), st.lists(st.integers(0, 3000), min_size=1, max_size=30))
-def test_the_fate_of_a_message_depends_on_its_number_alone(seed: int, order: list[int]) -> None:
+def test_the_fate_of_a_message_depends_on_its_number_only(seed: int, order: list[int]) -> None:
     one, other = (ImpairedLink(seed, delay=0.001, jitter=0.002, loss=0.2, burst=2.0) for _ in range(2))
     expected = fates(one, "feedback", 3001)
     for seq in order:
@@ -102,7 +102,7 @@ def test_directions_and_seeds_are_independent() -> None:
         {"burst": np.inf},
     ],
 )
-def test_what_no_network_does_is_refused(options: dict[str, float]) -> None:
+def test_impossible_link_parameters_are_refused(options: dict[str, float]) -> None:
     with pytest.raises(InputError, match=next(iter(options))):
         ImpairedLink(0, **options)
 
@@ -114,7 +114,7 @@ def test_what_no_network_does_is_refused(options: dict[str, float]) -> None:
     st.floats(0.0, 0.5),
     st.floats(1.0, 10.0),
 )
-def test_the_exchange_is_that_of_mailboxes(
+def test_the_compiled_exchange_equals_that_of_mailboxes(
     seed: int, delay: float, jitter: float, loss: float, burst: float
 ) -> None:
     options = {"delay": delay, "jitter": jitter, "loss": loss, "burst": burst}

@@ -41,7 +41,7 @@ def through(corners: Array, steps: int) -> Array:
 @pytest.mark.parametrize("n", [1.0, 1.7, 2.0, 5.0])
 @pytest.mark.parametrize(("beta", "gamma"), [(0.5, 0.5), (0.9, -0.3), (0.1, 0.9), (2.0, 1.0)])
 @pytest.mark.parametrize("steps", [1, 30])
-def test_without_degradation_and_pinching_it_is_bouc_wen(
+def test_without_degradation_and_pinching_bwbn_equals_bouc_wen(
     n: float, beta: float, gamma: float, steps: int
 ) -> None:
     path = through(CORNERS, steps)
@@ -60,7 +60,7 @@ def test_without_degradation_and_pinching_it_is_bouc_wen(
         {"n": 3.0, "beta": 0.2, "gamma": 0.8, "delta_nu": 0.3, "delta_psi": 0.1, "lambda_": 1.0},
     ],
 )
-def test_equals_an_adaptive_solver_of_order_eight(params: dict[str, float]) -> None:
+def test_the_model_agrees_with_an_adaptive_solver_of_order_eight(params: dict[str, float]) -> None:
     _, p, _ = specimens.pack("bwbn", **(BASE | params))
     q = bwbn.BwbnParams(*p.tolist())
     state, expected = np.zeros(2), []
@@ -95,7 +95,7 @@ def test_energy_is_the_work_of_the_hysteretic_spring() -> None:
     assert memory[-1, bwbn.ENERGY] * K * DY**2 == pytest.approx(work, rel=1e-5)
 
 
-def test_strength_falls_to_its_closed_form() -> None:
+def test_strength_degrades_as_in_the_closed_form() -> None:
     # far out z = (ν·(β + γ))^(−1/n), and ν follows from the energy
     _, memory = run(np.array([200.0 * DY]), delta_nu=0.05)
     _, z, energy = memory[0]
@@ -138,7 +138,7 @@ def test_an_increment_of_any_size_takes_a_bounded_time() -> None:
     st.floats(0.0, 0.99),
     st.floats(-1.0, 1.0),
 )
-def test_finite_and_energy_never_negative(
+def test_forces_are_finite_and_dissipated_energy_is_never_negative(
     path: list[float], n: float, beta: float, degradation: float, depth: float, q: float
 ) -> None:
     force, memory = run(
@@ -155,7 +155,7 @@ def test_finite_and_energy_never_negative(
     assert memory[:, bwbn.ENERGY].min() >= -1e-6
 
 
-def test_what_no_column_can_be_is_refused() -> None:
+def test_parameters_that_no_column_can_have_are_refused() -> None:
     for params in ({"gamma": -0.5}, {"zeta_s": 1.0}, {"psi": 0.0}, {"delta_eta": -1.0}):
         with pytest.raises(InputError):
             run(np.zeros(1), **params)

@@ -28,21 +28,23 @@ def through(corners: list[float], steps: int) -> Array:
     return np.concatenate([corners[:1], *parts])
 
 
-def test_hand_calculation_without_degradation_of_unloading() -> None:
+def test_the_loop_without_degraded_unloading_agrees_with_a_hand_calculation() -> None:
     # yields to 3, unloads at 1 to zero force at 1.8, aims at (-1, -1), follows the skeleton to -2, back
     path = [1.0, 3.0, 2.0, 1.8, 0.4, -1.0, -2.0, -0.9, 1.05, 3.0, 4.0]
     expected = [1.0, 1.2, 0.2, 0.0, -0.5, -1.0, -1.1, 0.0, 0.6, 1.2, 1.3]
     np.testing.assert_allclose(forces(path, hardening=0.1), expected, rtol=1e-13, atol=1e-14)
 
 
-def test_one_increment_across_every_branch() -> None:
+def test_one_increment_may_cross_every_branch() -> None:
     # unloading, reloading and skeleton of the other side in a single call
     np.testing.assert_allclose(forces([3.0, -5.0, 6.0], hardening=0.1), [1.2, -1.4, 1.5], rtol=1e-14)
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.3, 0.5, 1.0])
 @pytest.mark.parametrize("ductility", [1.5, 4.0])
-def test_unloading_stiffness(exponent: float, ductility: float) -> None:
+def test_the_unloading_stiffness_degrades_with_the_peak_deformation(
+    exponent: float, ductility: float
+) -> None:
     force = forces([ductility, ductility - 0.1], unloading=exponent)
     assert (force[0] - force[1]) / 0.1 == pytest.approx(ductility**-exponent, rel=1e-12)
 
@@ -59,7 +61,7 @@ def test_reversal_before_zero_force_aims_at_the_peak_again() -> None:
     np.testing.assert_allclose(forces(path), [1.0, -1.0, 0.0, 0.5, 0.25, 0.625, 1.0], rtol=1e-14)
 
 
-def test_crack_makes_the_skeleton_trilinear_and_closes() -> None:
+def test_a_crack_makes_the_skeleton_trilinear_and_the_crack_closes() -> None:
     params = {"crack_displacement": 0.2, "closing": 0.4, "hardening": 0.05}
     np.testing.assert_allclose(forces([0.1, 0.2, 1.0, 3.0], **params), [0.1, 0.2, 0.68, 0.78], rtol=1e-14)
     # below yielding the crack is a bend that stores work
@@ -76,7 +78,7 @@ def test_crack_makes_the_skeleton_trilinear_and_closes() -> None:
     st.floats(0.0, 0.5),
     st.integers(1, 7),
 )
-def test_finite_exact_in_any_steps_and_never_returning_work(
+def test_forces_are_finite_independent_of_steps_and_never_return_work(
     corners: list[float], hardening: float, unloading: float, closing: float, steps: int
 ) -> None:
     params = {
@@ -113,6 +115,6 @@ def test_work_is_never_negative(corners: list[float], hardening: float, unloadin
         ({"unloading": 1.5}, "at most 1"),
     ],
 )
-def test_what_no_column_can_be_is_refused(params: dict[str, float], says: str) -> None:
+def test_parameters_that_no_column_can_have_are_refused(params: dict[str, float], says: str) -> None:
     with pytest.raises(InputError, match=says):
         forces([0.0], **params)

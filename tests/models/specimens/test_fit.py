@@ -1,4 +1,4 @@
-"""Fits: parameters known beforehand come back, and the fibre column's curves are followed."""
+"""Fits of specimen models: known parameters are recovered, and the fibre column's curves are followed."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def test_every_model_can_be_fitted() -> None:
 
 
 @pytest.mark.parametrize("model", TRUE)
-def test_known_parameters_come_back(model: str) -> None:
+def test_known_parameters_are_recovered(model: str) -> None:
     path = protocol()
     force = forces(model, TRUE[model], path)
     found = fit(model, path, force)
@@ -157,7 +157,7 @@ def test_known_parameters_come_back(model: str) -> None:
 
 
 @pytest.mark.parametrize("model", TRUE)
-def test_intervals_hold_the_truth_under_noise(model: str) -> None:
+def test_intervals_cover_the_true_parameters_under_noise(model: str) -> None:
     path = protocol()
     clean = forces(model, TRUE[model], path)
     noise = 0.02 * np.abs(clean).max() * np.random.default_rng(3).standard_normal(path.size)
@@ -171,7 +171,7 @@ def test_intervals_hold_the_truth_under_noise(model: str) -> None:
         assert abs(value - middle) <= width, name
 
 
-def test_the_degrading_column_comes_back_from_a_start_nearby() -> None:
+def test_the_degrading_columns_parameters_are_recovered_from_a_near_start() -> None:
     path = protocol(20)
     force = forces("bwbn", DEGRADING, path)
     start = {name: value * 1.1 for name, value in DEGRADING.items() if name not in ("beta", "gamma")}
@@ -181,7 +181,7 @@ def test_the_degrading_column_comes_back_from_a_start_nearby() -> None:
     assert found.intervals.keys() == DEGRADING.keys()
 
 
-def test_a_start_with_another_sum_of_beta_and_gamma_is_the_same_loop() -> None:
+def test_a_start_with_another_sum_of_beta_and_gamma_gives_the_same_loop() -> None:
     path, one = protocol(), TRUE["bouc_wen"]
     scaled = one | {"beta": 1.4, "gamma": 0.6, "yield_displacement": DY * 2.0 ** (1.0 / 1.6)}
     np.testing.assert_allclose(
@@ -218,7 +218,7 @@ def test_bwbn_follows_the_fibre_column(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_fibre_column_leaves_the_same_peak_alike_each_time(name: str) -> None:
+def test_a_fibre_column_unloads_from_the_same_peak_equally_each_time(name: str) -> None:
     path, force = curve(name)
     falls = []
     for peak in np.flatnonzero(path == path.min()):
@@ -228,7 +228,7 @@ def test_a_fibre_column_leaves_the_same_peak_alike_each_time(name: str) -> None:
     assert falls == pytest.approx(falls[:1] * 3, rel=0.01)
 
 
-def test_what_cannot_be_fitted_is_refused() -> None:
+def test_records_that_cannot_be_fitted_are_refused() -> None:
     path = protocol()
     force = K * path
     for model, x, f, start, says in [

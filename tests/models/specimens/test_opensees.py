@@ -60,7 +60,7 @@ def test_bilinear_equals_steel01(ops: Any, hardening: float) -> None:
 
 
 @pytest.mark.parametrize("sharpness", [5.0, 20.0])
-def test_menegotto_and_pinto_is_steel02(ops: Any, sharpness: float) -> None:
+def test_menegotto_and_pinto_equals_steel02(ops: Any, sharpness: float) -> None:
     points = path(200)
     expected = theirs(ops, points, "Steel02", K * DY, K, 0.05, sharpness, 0.925, 0.15)
     found = ours("menegotto_pinto", points, hardening=0.05, sharpness=sharpness)
@@ -101,7 +101,7 @@ def test_pinched_equals_hysteretic(ops: Any, force: float, place: float, unloadi
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-3 * K * DY)
 
 
-def test_pinched_by_peak_is_pinching4(ops: Any) -> None:
+def test_pinched_by_peak_equals_pinching4(ops: Any) -> None:
     # theirs has a fourth line, which is here as steep as the third
     points, force, place, hardening = path(400), 0.3, 0.5, 0.05
     bend, yields = 0.5 * K * DY, 0.8 * K * DY
@@ -121,7 +121,7 @@ def test_pinched_by_peak_is_pinching4(ops: Any) -> None:
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * K * DY)
 
 
-def test_pinched_by_rest_is_the_hinge_of_ibarra_medina_and_krawinkler(ops: Any) -> None:
+def test_pinched_by_rest_equals_the_hinge_of_ibarra_medina_and_krawinkler(ops: Any) -> None:
     # theirs drops to no force for ever at some partial unloadings, so that this path has none; its cap and its energy
     # to failure are far away
     points, hardening, force, place = path(400)[:2000], 0.05, 0.3, 0.5
@@ -133,7 +133,7 @@ def test_pinched_by_rest_is_the_hinge_of_ibarra_medina_and_krawinkler(ops: Any) 
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * K * DY)
 
 
-def test_trilinear_is_a_sum_of_steel01(ops: Any) -> None:
+def test_trilinear_equals_a_sum_of_steel01(ops: Any) -> None:
     points, bend, second, hardening = path(200), 0.4, 0.5, 0.05
     ops.uniaxialMaterial("Steel01", 2, (1.0 - second) * K * bend * DY, (1.0 - second) * K, 0.0)
     ops.uniaxialMaterial("Steel01", 3, (second - hardening) * K * DY, (second - hardening) * K, 0.0)

@@ -1,4 +1,4 @@
-"""Specimen models: claims over the registry, and each model against closed forms and other software."""
+"""Specimen models: properties of all models in the registry, and each model against closed forms."""
 
 from __future__ import annotations
 
@@ -95,21 +95,21 @@ class TestRegistry:
         assert [module.step(p, s, x, *more) for x in path] == forces(name, path).tolist()
 
     @pytest.mark.parametrize("name", SPECIMENS)
-    def test_starts_elastic_and_is_odd(self, name: str) -> None:
+    def test_every_model_starts_elastic_and_is_odd(self, name: str) -> None:
         small = np.array([1e-7 * DY])
         np.testing.assert_allclose(forces(name, small), K * small, rtol=1e-6)
         path = cycles(2.5 * DY, 2, 17)
         np.testing.assert_array_equal(forces(name, -path), -forces(name, path))
 
     @pytest.mark.parametrize("name", SPECIMENS)
-    def test_repeats_and_standing_still_changes_nothing(self, name: str) -> None:
+    def test_repeated_runs_are_equal_and_zero_increments_change_nothing(self, name: str) -> None:
         path = cycles(2.5 * DY, 2, 17)
         np.testing.assert_array_equal(forces(name, path), forces(name, path))
         np.testing.assert_array_equal(forces(name, np.repeat(path, 3))[::3], forces(name, path))
 
     @pytest.mark.parametrize("name", SPECIMENS)
     @pytest.mark.parametrize("steps", [1, 2, 7, 200])
-    def test_subdivision_of_the_increments_does_not_matter(self, name: str, steps: int) -> None:
+    def test_the_force_does_not_depend_on_the_subdivision_of_increments(self, name: str, steps: int) -> None:
         coarse, fine = cycles(4 * DY, 3, steps), cycles(4 * DY, 3, 10 * steps)
         expected = forces(name, fine)[::10]
         np.testing.assert_allclose(forces(name, coarse), expected, atol=1e-6 * K * DY, rtol=0)
@@ -120,7 +120,7 @@ class TestRegistry:
         assert np.all(np.isfinite(forces(name, path)))
 
     @pytest.mark.parametrize("name", SPECIMENS)
-    def test_a_deformation_that_is_no_number_does_not_hang(self, name: str) -> None:
+    def test_a_nan_deformation_does_not_hang(self, name: str) -> None:
         assert math.isnan(forces(name, np.array([math.nan]))[0])
         forces(name, np.array([math.inf, 0.0]))
 
@@ -134,13 +134,13 @@ class TestRegistry:
 
 
 class TestPack:
-    def test_parameters_in_order_and_memory_at_rest(self) -> None:
+    def test_parameters_are_packed_in_order_with_the_memory_at_rest(self) -> None:
         kind, p, s = specimens.pack("bilinear", hardening=0.1, yield_displacement=DY, stiffness=K)
         assert (kind, p.tolist(), s.tolist()) == (1, [K, DY, 0.1], [0.0] * STATE_SIZE)
         assert p.dtype == s.dtype == np.float64
         assert p.flags.c_contiguous
 
-    def test_defaults_are_the_common_ones(self) -> None:
+    def test_the_default_parameters_are_the_common_ones(self) -> None:
         assert specimens.pack("bouc_wen", stiffness=K, yield_displacement=DY)[1].tolist() == [
             K,
             DY,
@@ -166,12 +166,14 @@ class TestPack:
             ("bouc_wen", {"stiffness": K, "yield_displacement": DY, "gamma": -0.5}, "beta \\+ gamma"),
         ],
     )
-    def test_what_no_column_can_be_is_refused(self, name: str, params: dict[str, float], says: str) -> None:
+    def test_parameters_that_no_column_can_have_are_refused(
+        self, name: str, params: dict[str, float], says: str
+    ) -> None:
         with pytest.raises(InputError, match=says):
             specimens.pack(name, **params)
 
 
-def test_linear_is_the_identity_times_stiffness() -> None:
+def test_the_linear_model_gives_stiffness_times_deformation() -> None:
     path = np.random.default_rng(1).standard_normal(100)
     np.testing.assert_array_equal(forces("linear", path), K * path)
 
@@ -179,7 +181,7 @@ def test_linear_is_the_identity_times_stiffness() -> None:
 class TestBilinear:
     @pytest.mark.parametrize("alpha", [0.0, 0.02, 0.3])
     @pytest.mark.parametrize("ductility", [1.0, 1.5, 4.0])
-    def test_energy_of_a_cycle(self, alpha: float, ductility: float) -> None:
+    def test_the_energy_of_a_cycle_agrees_with_the_closed_form(self, alpha: float, ductility: float) -> None:
         # the force is a straight line between the corners only where steps meet them
         path = cycles(ductility * DY, 3, 1200)
         force = forces("bilinear", path, hardening=alpha)
@@ -187,13 +189,13 @@ class TestBilinear:
         expected = 4.0 * (1.0 - alpha) * K * DY * (ductility - 1.0) * DY
         assert work(force[-one - 1 :], path[-one - 1 :]) == pytest.approx(expected, rel=1e-5, abs=1e-6)
 
-    def test_corners_of_the_loop(self) -> None:
+    def test_the_corners_of_the_loop_agree_with_the_closed_form(self) -> None:
         # hand calculation with k = 1, δ_y = 1, α = 0.1: yields at 1, unloads by 2, then hardens backwards
         path = np.array([0.5, 1.0, 3.0, 1.0, -3.0, -1.0, 0.0, 3.0])
         force = forces("bilinear", path, stiffness=1.0, yield_displacement=1.0, hardening=0.1)
         np.testing.assert_allclose(force, [0.5, 1.0, 1.2, -0.8, -1.2, 0.8, 0.9, 1.2], rtol=1e-14)
 
-    def test_without_yielding_it_is_linear(self) -> None:
+    def test_without_yielding_the_model_is_linear(self) -> None:
         path = np.random.default_rng(2).uniform(-DY, DY, 100)
         path = 0.999 * path / np.abs(path).max() * DY
         np.testing.assert_allclose(forces("bilinear", path), K * path, rtol=1e-11, atol=1e-6)
@@ -202,7 +204,9 @@ class TestBilinear:
 class TestBoucWen:
     @pytest.mark.parametrize("n", [1.0, 1.7, 2.0, 5.0])
     @pytest.mark.parametrize(("beta", "gamma"), [(0.5, 0.5), (0.8, 0.2), (0.9, -0.3), (0.1, 0.9), (2.0, 1.0)])
-    def test_equals_an_adaptive_solver_of_order_eight(self, n: float, beta: float, gamma: float) -> None:
+    def test_the_model_agrees_with_an_adaptive_solver_of_order_eight(
+        self, n: float, beta: float, gamma: float
+    ) -> None:
         corners = np.array([0.0, 2.0, -1.0, 0.7, -3.0, 4.0, 3.5, 3.8, -0.2]) * DY
         z, expected = 0.0, []
         for a, b in pairwise(corners):
@@ -222,7 +226,7 @@ class TestBoucWen:
         many_steps = forces("bouc_wen", ticks, n=n, beta=beta, gamma=gamma)[99::100]
         np.testing.assert_allclose(many_steps, expected, rtol=0, atol=1e-6 * K * DY)
 
-    def test_first_loading_has_the_closed_form(self) -> None:
+    def test_first_loading_agrees_with_the_closed_form(self) -> None:
         x = np.linspace(0.0, 3.0, 50)[1:]
         rounded = forces("bouc_wen", x * DY, hardening=0.0, n=2.0)
         np.testing.assert_allclose(rounded / (K * DY), np.tanh(x), atol=1e-7)
@@ -231,7 +235,9 @@ class TestBoucWen:
 
     @pytest.mark.parametrize("n", [1.0, 2.0, 3.5, 20.0])
     @pytest.mark.parametrize(("beta", "gamma"), [(0.5, 0.5), (3.0, 1.0), (0.3, -0.2), (0.1, 0.1)])
-    def test_ultimate_force(self, n: float, beta: float, gamma: float) -> None:
+    def test_the_ultimate_force_agrees_with_the_closed_form(
+        self, n: float, beta: float, gamma: float
+    ) -> None:
         alpha, far = 0.05, 1000.0 * DY
         bound = (beta + gamma) ** (-1.0 / n)
         force = forces("bouc_wen", np.array([far, -far]), n=n, beta=beta, gamma=gamma)

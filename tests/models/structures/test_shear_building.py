@@ -11,7 +11,7 @@ from common.errors import InputError
 from models.structures import shear_building
 
 
-def test_building_of_the_seed_paper() -> None:
+def test_the_seed_papers_building_has_its_period_and_damping_ratio() -> None:
     M, C, K = shear_building.matrices(np.array([160_000.0]), np.array([25e6]), np.array([200_000.0]))
     modes = shear_building.modes(M, C, K)
     assert modes.periods[0] == pytest.approx(0.5027, abs=5e-5)
@@ -51,7 +51,7 @@ def test_matrices_equal_the_sum_of_the_storeys() -> None:
     assert spring.sum() == pytest.approx(stiffness[0] * x[0])
 
 
-def test_drift_and_nodal_force_of_each_storey() -> None:
+def test_drift_and_nodal_force_of_each_storey_are_computed() -> None:
     x = np.array([1.0, 3.0, 7.0])
     assert [shear_building.storey_drift(x, i) for i in range(3)] == [1.0, 2.0, 4.0]
     out = np.zeros(3)
