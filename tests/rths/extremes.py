@@ -21,7 +21,7 @@ EVENTS: tuple[tuple[Any, ...], ...] = (
 
 
 def value(row: Signal, tick: int) -> Any:
-    """What a signal is at a tick; lists where there are several storeys or slaves."""
+    """The value of a signal at a tick; a list where there are several storeys or slaves."""
     if row.name == "seq":
         return tick
     found = {

@@ -1,4 +1,4 @@
-"""Recordings of tests of every shape: made up of sines, so that they need no loop and are known in closed form."""
+"""Recordings of tests of every shape, made of sines: they need no loop and are known in closed form."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def write(shape: str, folder: Path) -> Path:
 
 
 def values(rows: Iterable[Signal], tick: int, storeys: int) -> Iterable[object]:
-    """What a tick has of each row."""
+    """The values of a tick for each row."""
     for row in rows:
         count = row.count(storeys)
         each = [value(row, tick, place) for place in range(count)]

@@ -20,7 +20,9 @@ NUMBERS = st.integers(0, 10_000)
 
 @given(NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS)
 @example(531, 503, 111, 0, 0)
-def test_the_sum_holds_for_any_counts(sent: int, used: int, rejected: int, beyond: int, extra: int) -> None:
+def test_the_account_of_messages_adds_up_for_any_counts(
+    sent: int, used: int, rejected: int, beyond: int, extra: int
+) -> None:
     found = account(sent, used, rejected, beyond, extra)
     assert found.sent == sent == found.used + found.rejected + found.lost
     assert min(found) >= 0
@@ -34,7 +36,7 @@ def test_the_sum_holds_for_any_counts(sent: int, used: int, rejected: int, beyon
     late=st.dictionaries(st.integers(0, TICKS - 1), st.integers(1, 40), max_size=10),
     injected=st.lists(st.tuples(st.integers(0, TICKS + 30), st.integers(-2, TICKS + 60)), max_size=40),
 )
-def test_the_account_of_a_link_that_loses_and_is_late_while_others_send(
+def test_the_account_adds_up_over_a_link_with_loss_delay_and_strangers(
     sent: int,
     missed: set[int],
     dropped: set[int],
@@ -60,7 +62,7 @@ def test_the_account_of_a_link_that_loses_and_is_late_while_others_send(
         assert (found.foreign, found.lost) == (0, len(dropped & set(own)))
 
 
-def test_commands_that_somebody_injected_are_counted_apart(tmp_path: Path) -> None:
+def test_injected_commands_are_counted_separately(tmp_path: Path) -> None:
     """531 commands were sent; a stranger's 3 under higher numbers came into force, 2 came twice, 1 far ahead."""
     path, sent = tmp_path / "a.mcap", 531
     recording = Recording(path, "trial", 1, signals.TOPICS)
@@ -84,13 +86,13 @@ def filled(topic: str, **values: int) -> list[float | int | bool]:
     return [values.get(row.name, 0) for row in signals.TOPICS[topic]]
 
 
-def test_what_cannot_have_been_sent_yet_has_no_fate() -> None:
+def test_a_message_numbered_ahead_of_time_is_not_counted_as_used_or_rejected() -> None:
     tally = Tally(TICKS, WINDOW)
     assert not tally.admit(50, 5)
     assert (tally.used, tally.rejected, tally.reasons[AHEAD]) == (0, 0, 1)
 
 
-def test_a_perfect_virtual_link_rejects_nothing(virtual_recording: Path) -> None:
+def test_a_link_without_impairments_rejects_nothing_in_virtual_time(virtual_recording: Path) -> None:
     found = accounts(read(virtual_recording))
     assert {name: (counts["rejected"], counts["lost"]) for name, counts in found.items()} == {
         "slave/commands": (0, 0),

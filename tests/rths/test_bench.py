@@ -32,7 +32,7 @@ NOMINAL: dict[str, dict[str, tuple[float, float]]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", NOMINAL)
-def test_what_the_plan_says_is_identified_from_the_bench_recording(
+def test_the_planned_parameters_are_identified_from_the_bench_recording(
     part: str,
     call: Any,
     capsys: Any,
@@ -60,7 +60,7 @@ def test_what_the_plan_says_is_identified_from_the_bench_recording(
         )
 
 
-def test_a_reality_shows_in_the_bench_recording_but_not_its_name(
+def test_a_realitys_effect_appears_in_the_bench_recording_and_its_name_does_not(
     call: Any,
     capsys: Any,
     tmp_path: Path,
@@ -93,7 +93,7 @@ def test_a_limit_stops_a_bench_test_and_the_recording_stays(
 
 
 @pytest.mark.slow
-def test_in_real_time_it_gives_the_same_numbers(call: Any, tmp_path: Path) -> None:
+def test_a_bench_test_gives_the_same_numbers_in_real_time(call: Any, tmp_path: Path) -> None:
     runs = []
     for clock in ("--virtual", "--real-time"):
         path = tmp_path / f"{clock}.mcap"
@@ -105,7 +105,7 @@ def test_in_real_time_it_gives_the_same_numbers(call: Any, tmp_path: Path) -> No
     assert np.all(np.diff(real.log_ns["slave"]) == 2_000_000)
 
 
-def test_wrong_wishes_get_a_sentence(
+def test_wrong_requests_get_one_sentence(
     call: Any,
     capsys: Any,
     tmp_path: Path,
@@ -124,7 +124,7 @@ def test_wrong_wishes_get_a_sentence(
 
 
 @pytest.mark.slow
-def test_a_plug_in_laboratory_goes_through_the_same_bench_test(
+def test_a_plug_in_laboratory_runs_the_same_bench_test(
     call: Any,
     capsys: Any,
     tmp_path: Path,
@@ -153,7 +153,7 @@ def test_a_hysteretic_model_is_fitted_to_the_realistic_column(
 
 
 @pytest.mark.parametrize(("file", "role"), [("two_columns", "slave.east"), ("viscous_damper.toml", "slave")])
-def test_a_bench_test_goes_as_far_as_beside_a_rig(file: str, role: str) -> None:
+def test_a_bench_test_of_an_emulation_has_the_same_reach_as_with_a_rig(file: str, role: str) -> None:
     plan = load(
         ROOT / ("examples" if file.endswith(".toml") else "rths/plans") / Path(file).with_suffix(".toml")
     )

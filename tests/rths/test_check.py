@@ -1,4 +1,4 @@
-"""`rths check`: the figures of a plan, slips of units, and classes that are named and never run."""
+"""`rths check`: the figures of a plan, mistaken units, and classes that are listed and never run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def checked(call: Any, capsys: Any, path: Path | str) -> tuple[int, dict[str, An
     return code, json.loads(capsys.readouterr().out)
 
 
-def test_the_default_plan_in_figures(call: Any, capsys: Any) -> None:
+def test_check_prints_the_figures_of_the_default_plan(call: Any, capsys: Any) -> None:
     code, facts = checked(call, capsys, "default")
     assert (code, facts["ready"], facts["stable"]) == (0, True, True)
     assert (facts["slips"], facts["classes"], facts["refused"]) == ([], [], [])
@@ -38,7 +38,7 @@ def test_the_default_plan_in_figures(call: Any, capsys: Any) -> None:
     assert facts["recording"]["bytes"] == pytest.approx(10e6, rel=0.2)
 
 
-def test_every_peak_of_a_kind_of_ones_own_has_its_unit(call: Any, capsys: Any) -> None:
+def test_every_peak_of_a_users_kind_has_its_unit(call: Any, capsys: Any) -> None:
     code, facts = checked(call, capsys, ROOT / "examples" / "viscous_damper.toml")
     units = {name: peak["unit"] for name, peak in facts["peaks"].items() if name.startswith("piston")}
     assert code == 0
@@ -51,7 +51,7 @@ def test_every_peak_of_a_kind_of_ones_own_has_its_unit(call: Any, capsys: Any) -
     }
 
 
-def test_it_computes_what_pre_flight_computes(tmp_path: Path) -> None:
+def test_check_computes_the_same_as_pre_flight(tmp_path: Path) -> None:
     path = tmp_path / "p.toml"
     path.write_text(SHORT)
     plan = plans.load(path)
@@ -59,7 +59,7 @@ def test_it_computes_what_pre_flight_computes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", cli.SHIPPED)
-def test_the_plans_that_ship_have_no_slips(name: str, call: Any, capsys: Any) -> None:
+def test_the_shipped_plans_have_no_mistaken_units(name: str, call: Any, capsys: Any) -> None:
     code, facts = checked(call, capsys, name)
     assert (code, facts["slips"]) == (0, [])
 
@@ -95,7 +95,7 @@ def test_the_plans_that_ship_have_no_slips(name: str, call: Any, capsys: Any) ->
         ("[actuator]\ntime_constant = 30.0\n", "time_constant in [actuator]", "must be in s"),
     ],
 )
-def test_a_slip_of_units_is_pointed_at(
+def test_a_mistaken_unit_is_pointed_out(
     text: str, where: str, words: str, call: Any, capsys: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "p.toml").write_text(SHORT + text)
@@ -107,7 +107,7 @@ def test_a_slip_of_units_is_pointed_at(
 @pytest.mark.parametrize(
     ("numbers", "words"), [("0.0\n0.3\n-0.2\n", "numbers are in g"), ("0.0\n300\n-200\n", "are in gal")]
 )
-def test_a_record_in_another_unit_is_pointed_at(
+def test_a_record_in_another_unit_is_pointed_out(
     numbers: str, words: str, call: Any, capsys: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "site.txt").write_text(numbers * 50)
@@ -118,7 +118,9 @@ def test_a_record_in_another_unit_is_pointed_at(
     assert [words in slip["text"] for slip in facts["slips"]] == [True]
 
 
-def test_what_pre_flight_would_refuse_is_exit_1(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_a_plan_that_pre_flight_would_refuse_gives_exit_code_1(
+    call: Any, capsys: Any, tmp_path: Path
+) -> None:
     (tmp_path / "p.toml").write_text("[actuator]\ndelay = 0.2\n")
     code, facts = checked(call, capsys, tmp_path / "p.toml")
     assert (code, facts["ready"], facts["stable"], facts["peaks"]) == (1, False, False, {})
@@ -129,7 +131,7 @@ def test_what_pre_flight_would_refuse_is_exit_1(call: Any, capsys: Any, tmp_path
     assert "raise" not in text
 
 
-def test_a_plan_that_cannot_be_used_is_exit_2(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_an_invalid_plan_gives_exit_code_2(call: Any, capsys: Any, tmp_path: Path) -> None:
     (tmp_path / "p.toml").write_text("[test]\ninterval = 2\n")
     assert call("check", tmp_path / "p.toml") == 2
     assert "interval in [test] is 2.0, but must be" in capsys.readouterr().err
@@ -154,7 +156,7 @@ def test_classes_are_named_with_their_files_and_never_imported(
     assert not (tmp_path / "ran").exists()
 
 
-def test_the_class_of_a_kind_is_listed_too_and_with_classes_alone_not_imported(
+def test_the_class_of_a_users_kind_is_listed_and_with_classes_only_not_imported(
     call: Any, capsys: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "own.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\nclass Own: ...\n")
@@ -180,9 +182,7 @@ def test_the_file_of_a_module_is_found_without_importing_its_package(
     assert classes.file_of("none7.lab:Lab", tmp_path) == ""
 
 
-def test_a_rig_in_another_process_is_asked_whether_it_is_there(
-    call: Any, capsys: Any, tmp_path: Path
-) -> None:
+def test_a_rig_in_another_process_is_checked_for_presence(call: Any, capsys: Any, tmp_path: Path) -> None:
     path = tmp_path / "p.toml"
     with served(example.Column, example.CHANNELS) as address:
         path.write_text(f'{SHORT}{UNHURRIED}[master.rig]\naddress = "{address}"\n')
@@ -197,7 +197,7 @@ def test_a_rig_in_another_process_is_asked_whether_it_is_there(
     assert "its rigs are in other processes." in text
 
 
-def test_a_rig_that_is_not_there_or_another_kinds_would_be_refused(
+def test_check_refuses_a_rig_that_is_absent_or_of_another_kind(
     call: Any, capsys: Any, tmp_path: Path
 ) -> None:
     path = tmp_path / "p.toml"

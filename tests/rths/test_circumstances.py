@@ -1,4 +1,4 @@
-"""The sentences on the clock and the rigs of a recording, and its response storey by storey."""
+"""The sentences about the clock and the rigs of a recording, and its response storey by storey."""
 
 from __future__ import annotations
 
@@ -21,13 +21,15 @@ from report.facts.summary import summarize
 
 
 def without_the_record(path: Path) -> Run:
-    """A recording as one was before it said what kept its time."""
+    """A recording in the older form that does not state its clock."""
     run = read(path)
     del run.metadata[CLOCK]
     return run
 
 
-def test_a_virtual_run_says_so_and_shows_no_latency(call: Any, capsys: Any, virtual_recording: Path) -> None:
+def test_a_run_in_virtual_time_states_this_and_shows_no_latency(
+    call: Any, capsys: Any, virtual_recording: Path
+) -> None:
     assert call("inspect", virtual_recording) == 0
     out = capsys.readouterr().out.splitlines()
     assert out[2] == (
@@ -44,7 +46,7 @@ def test_a_virtual_run_says_so_and_shows_no_latency(call: Any, capsys: Any, virt
     assert "needs latency of a test in real time, and this one ran in virtual time" in capsys.readouterr().err
 
 
-def test_an_old_recording_says_what_its_times_show_and_nothing_else(virtual_recording: Path) -> None:
+def test_for_an_old_recording_only_what_its_times_show_is_stated(virtual_recording: Path) -> None:
     run = without_the_record(virtual_recording)
     assert circumstances.clock_of(run) == circumstances.VIRTUAL
     run.columns["latency"]["compute_time"][7] = 4e-5
@@ -61,7 +63,7 @@ def test_an_old_recording_says_what_its_times_show_and_nothing_else(virtual_reco
         ("lab.py:TableLab", "the plan's rigs: master emulated, slave lab.py:TableLab."),
     ],
 )
-def test_of_the_rigs_the_plan_alone_is_asked(
+def test_the_sentence_about_the_rigs_follows_from_the_plan_only(
     rig: str, said: str, virtual_recording: Path, short_plan: Plan
 ) -> None:
     run = read(virtual_recording)
@@ -70,7 +72,7 @@ def test_of_the_rigs_the_plan_alone_is_asked(
     assert circumstances.sentence(run, plan).endswith(said)
 
 
-def test_three_storeys_have_a_drift_and_a_shear_each() -> None:
+def test_each_of_three_storeys_has_its_drift_and_shear() -> None:
     t = np.array([0.0, 0.002, 0.004])
     plan = from_tables(
         {"structure": {"mass": [1e5] * 3, "stiffness": [8e7, 6e7, 4e7], "damping": [1e5] * 3}}, Path()
@@ -89,7 +91,9 @@ def test_three_storeys_have_a_drift_and_a_shear_each() -> None:
     assert storeys.storeys(run, plan, laboratories(run))[0]["shear"]["peak"] == 510.0
 
 
-def test_the_modes_are_those_of_the_plan(call: Any, capsys: Any, virtual_recording: Path) -> None:
+def test_the_modes_of_a_recording_are_those_of_its_plan(
+    call: Any, capsys: Any, virtual_recording: Path
+) -> None:
     assert call("inspect", virtual_recording, "--json") == 0
     found = json.loads(capsys.readouterr().out)
     assert found["modes"][0]["period"] == pytest.approx(0.5027, abs=1e-4)

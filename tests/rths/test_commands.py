@@ -1,4 +1,4 @@
-"""The commands as a user calls them, in this process: output, files, exit codes, sentences."""
+"""The commands as a user calls them, in this process: output, files, exit codes and messages."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ def test_the_overview_names_every_command(call: Any, capsys: Any) -> None:
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_every_help_has_an_example_that_its_parser_takes(verb: str, call: Any, capsys: Any) -> None:
+def test_every_help_has_an_example_that_its_parser_accepts(verb: str, call: Any, capsys: Any) -> None:
     assert call(verb, "--help") == 0
     assert f"example: {EXAMPLES[verb]}" in capsys.readouterr().out
     assert parser_for(verb).parse_args(EXAMPLES[verb].partition(" >")[0].split()[2:])
 
 
-def test_registries_agree() -> None:
+def test_the_registries_of_commands_agree() -> None:
     assert set(EXAMPLES) == set(VERBS)
     assert set(MODULES) <= set(VERBS)
 
 
-def test_an_unknown_command_gets_the_nearest(call: Any, capsys: Any) -> None:
+def test_an_unknown_command_is_refused_with_the_nearest_name(call: Any, capsys: Any) -> None:
     assert call("insepct") == 2
     assert capsys.readouterr().err == "rths: unknown command 'insepct': did you mean inspect?\n"
 
 
-def test_inspect_says_what_is_in_a_recording(call: Any, capsys: Any, virtual_recording: Path) -> None:
+def test_inspect_reports_the_contents_of_a_recording(call: Any, capsys: Any, virtual_recording: Path) -> None:
     assert call("inspect", virtual_recording) == 0
     out = capsys.readouterr().out
     assert "El Centro 1940 NS" in out
@@ -63,7 +63,7 @@ def test_inspect_says_what_is_in_a_recording(call: Any, capsys: Any, virtual_rec
     assert f"gain {summary['force_path']['gain']:.4f} at" in out
 
 
-def test_inspect_as_json(call: Any, capsys: Any, virtual_recording: Path) -> None:
+def test_inspect_reports_as_json(call: Any, capsys: Any, virtual_recording: Path) -> None:
     assert call("inspect", virtual_recording, "--json") == 0
     found = json.loads(capsys.readouterr().out)
     assert found["topics"]["slave"] == {
@@ -77,7 +77,7 @@ def test_inspect_as_json(call: Any, capsys: Any, virtual_recording: Path) -> Non
     assert found["peaks"]["slave/damper_force"]["unit"] == "N"
 
 
-def test_inspect_says_again_what_is_missing(
+def test_inspect_reports_where_a_cut_off_recording_ends(
     call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
 ) -> None:
     cut = tmp_path / "cut.mcap"
@@ -99,12 +99,12 @@ def test_simulate_reports_peaks_and_writes_a_recording(call: Any, capsys: Any, t
     assert read(path).ticks("slave") == 2000
 
 
-def test_simulate_says_that_the_uncompensated_test_is_unstable(call: Any, capsys: Any) -> None:
+def test_simulate_reports_that_the_uncompensated_test_is_unstable(call: Any, capsys: Any) -> None:
     assert call("simulate", "default", "--uncompensated", "--no-amd") == 1
     assert "beyond its limit" in capsys.readouterr().out
 
 
-def test_a_run_against_its_simulation(
+def test_a_run_is_compared_with_its_simulation(
     call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
 ) -> None:
     noisy = tmp_path / "noisy.mcap"
@@ -117,7 +117,7 @@ def test_a_run_against_its_simulation(
     assert "differs by more than the tolerance 0" in capsys.readouterr().out
 
 
-def test_replay_matches_to_the_last_bit_and_notices_a_changed_measurement(
+def test_replay_matches_to_the_last_bit_and_detects_a_changed_measurement(
     call: Any, capsys: Any, virtual_recording: Path, monkeypatch: Any
 ) -> None:
     assert call("replay", virtual_recording) == 0
@@ -159,7 +159,7 @@ def test_export_and_import_return_the_same_numbers(
     assert call("inspect", again) == 0
 
 
-def test_what_writes_files_names_them_as_json(
+def test_commands_that_write_files_name_them_in_their_json(
     call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
 ) -> None:
     assert call("export", virtual_recording, "-o", tmp_path / "a.csv", "--json") == 0
@@ -211,7 +211,7 @@ BAD_MAPS = {
 
 
 @pytest.mark.parametrize("text_and_message", BAD_MAPS.values(), ids=BAD_MAPS.keys())
-def test_a_wrong_map_is_one_sentence(
+def test_a_wrong_import_map_is_refused_in_one_sentence(
     call: Any, capsys: Any, tmp_path: Path, text_and_message: tuple[str, str]
 ) -> None:
     text, message = text_and_message
@@ -226,7 +226,9 @@ def test_a_wrong_map_is_one_sentence(
     assert error.count("\n") == 1
 
 
-def test_plot_draws_what_there_is(call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path) -> None:
+def test_plot_draws_the_signals_that_are_recorded(
+    call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
+) -> None:
     assert call("plot", virtual_recording, "-o", tmp_path / "pictures", "--format", "svg") == 0
     drawn = sorted(path.name for path in (tmp_path / "pictures").iterdir())
     names = ["histories", "hysteresis", "spectra", "synchronisation", "tracking"]
@@ -272,7 +274,7 @@ WRONG_CALLS: dict[str, tuple[list[str], str]] = {
 
 
 @pytest.mark.parametrize("words_and_message", WRONG_CALLS.values(), ids=WRONG_CALLS.keys())
-def test_a_mistake_is_one_sentence_and_exit_code_2(
+def test_a_mistake_gives_one_sentence_and_exit_code_2(
     words_and_message: tuple[list[str], str], call: Any, capsys: Any, tmp_path: Path, virtual_recording: Path
 ) -> None:
     words, message = words_and_message

@@ -1,4 +1,4 @@
-"""Several recordings side by side: tables, page, histories for other programs."""
+"""Several recordings are compared side by side in tables, on a page, and as histories for other programs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.rths.report.pages import check_in_browser
 
 @pytest.fixture(scope="module")
 def three(virtual_recording: Path, short_plan: Plan, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """The short test at two scales, and shorter."""
+    """Three recordings: the short test at two scales, and a shorter one."""
     folder = tmp_path_factory.mktemp("three")
     found = [virtual_recording]
     for name, scale, duration in (("strong", 0.2, 2.0), ("brief", 0.1, 1.0)):
@@ -34,7 +34,9 @@ def three(virtual_recording: Path, short_plan: Plan, tmp_path_factory: pytest.Te
     return found
 
 
-def test_figures_of_all_are_those_of_each(call: Any, capsys: Any, three: list[Path]) -> None:
+def test_the_compared_figures_equal_those_of_each_recording(
+    call: Any, capsys: Any, three: list[Path]
+) -> None:
     assert call("compare", *three, "--json") == 0
     found = json.loads(capsys.readouterr().out)
     assert [one["recording"] for one in found] == ["short", "strong", "brief"]
@@ -57,7 +59,7 @@ def test_tables_have_the_units_and_keys_asked_for(call: Any, capsys: Any, three:
     assert ["ground_motion.scale", "default", "0.2", "default"] in lines
 
 
-def test_histories_go_to_other_programs(call: Any, three: list[Path], tmp_path: Path) -> None:
+def test_histories_are_written_for_other_programs(call: Any, three: list[Path], tmp_path: Path) -> None:
     out = tmp_path / "all.parquet"
     assert call("compare", *three, "--signals", "column_force:kN", "-o", out) == 0
     table = parquet.read_table(out)
@@ -84,7 +86,7 @@ def test_the_page_fits_screens_phones_and_paper(call: Any, three: list[Path], tm
         (("nowhere.mcap",), "Cannot read the recording nowhere.mcap"),
     ],
 )
-def test_wrong_words_get_one_sentence(
+def test_wrong_arguments_get_one_sentence(
     call: Any, capsys: Any, three: list[Path], words: tuple[str, ...], said: str
 ) -> None:
     assert call("compare", *three, *words) == 2
@@ -92,19 +94,21 @@ def test_wrong_words_get_one_sentence(
     assert said in error
 
 
-def test_more_than_can_be_told_apart_are_refused(call: Any, capsys: Any, three: list[Path]) -> None:
+def test_a_repeated_recording_and_more_than_fifty_are_refused(
+    call: Any, capsys: Any, three: list[Path]
+) -> None:
     assert call("compare", *three, three[0]) == 2
     assert "given twice" in capsys.readouterr().err
     assert call("compare", *(f"{number}.mcap" for number in range(runs.MOST + 1))) == 2
     assert "at most 50" in capsys.readouterr().err
 
 
-def test_files_of_one_name_are_told_apart_by_their_folders() -> None:
+def test_files_of_the_same_name_are_distinguished_by_their_folders() -> None:
     assert runs.labelled([Path("a/x.mcap"), Path("b/x.mcap")]) == ["a/x", "b/x"]
     assert runs.labelled([Path("a/x.mcap"), Path("b/y.mcap")]) == ["x", "y"]
 
 
-def test_rows_of_a_table_that_is_split_can_be_told_apart() -> None:
+def test_rows_of_a_split_table_repeat_their_names() -> None:
     head = ["recording", "system", *"abcdefg"]
     rows = [
         [recording, system, *"1234567"] for recording in ("one", "two") for system in ("actuator", "table")

@@ -1,4 +1,4 @@
-"""`rths diagnose` as a user calls it: files, exit codes, sentences; and realities with effects."""
+"""`rths diagnose` as a user calls it: files, exit codes, messages; and realities with effects."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FRICTION = {"damper.friction": {"force": 3.0}}
 
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
-    """Recordings with known secrets, made on demand."""
+    """Recordings with known hidden effects, made on demand."""
     return Cases(tmp_path_factory.mktemp("cases"))
 
 
@@ -36,7 +36,7 @@ def checked(path: Path) -> dict[str, Any]:
 
 
 def sentence(capsys: Any, message: str) -> None:
-    """The complaint is one sentence on standard error."""
+    """Asserts that the message is one sentence on standard error."""
     out, error = capsys.readouterr()
     assert out == ""
     assert message in error
@@ -45,7 +45,9 @@ def sentence(capsys: Any, message: str) -> None:
     assert "Traceback" not in error
 
 
-def test_report_page_and_summary(call: Any, capsys: Any, cases: Cases, tmp_path: Path) -> None:
+def test_diagnose_writes_report_page_and_summary(
+    call: Any, capsys: Any, cases: Cases, tmp_path: Path
+) -> None:
     out, html = tmp_path / "gap.json", tmp_path / "gap.html"
     path = cases.file(FRICTION, duration=8.0)
     reality = tmp_path / "found.toml"
@@ -72,7 +74,7 @@ def test_report_page_and_summary(call: Any, capsys: Any, cases: Cases, tmp_path:
 
 
 @pytest.mark.slow
-def test_the_ideal_test_as_yardstick(call: Any, cases: Cases, tmp_path: Path) -> None:
+def test_the_gap_can_be_measured_against_the_ideal_test(call: Any, cases: Cases, tmp_path: Path) -> None:
     out, plain = tmp_path / "a.json", tmp_path / "b.json"
     assert call("diagnose", cases.file(duration=8.0), "--ideal", "--json", out) == 0
     assert call("diagnose", cases.file(duration=8.0), "--json", plain) == 0
@@ -100,7 +102,9 @@ TO_FOLDER = {"report": "--json", "page": "--html"}
 
 
 @pytest.mark.parametrize("kind", MISTAKES)
-def test_a_mistake_is_one_sentence(call: Any, capsys: Any, cases: Cases, tmp_path: Path, kind: str) -> None:
+def test_a_mistake_gives_one_sentence(
+    call: Any, capsys: Any, cases: Cases, tmp_path: Path, kind: str
+) -> None:
     path = cases.file(duration=2.0)
     (tmp_path / "text.mcap").write_text("no recording at all\n")
     (tmp_path / "empty.mcap").write_bytes(b"")
@@ -112,14 +116,16 @@ def test_a_mistake_is_one_sentence(call: Any, capsys: Any, cases: Cases, tmp_pat
 
 
 @pytest.mark.parametrize("option", TO_FOLDER.values(), ids=TO_FOLDER)
-def test_a_folder_cannot_be_written(
+def test_an_output_folder_that_cannot_be_written_is_reported(
     call: Any, capsys: Any, cases: Cases, tmp_path: Path, option: str
 ) -> None:
     assert call("diagnose", cases.file(duration=2.0), option, tmp_path) == 2
     sentence(capsys, "Cannot write")
 
 
-def test_a_few_ticks_are_not_enough(call: Any, capsys: Any, cases: Cases, tmp_path: Path) -> None:
+def test_a_recording_of_a_few_ticks_is_not_enough(
+    call: Any, capsys: Any, cases: Cases, tmp_path: Path
+) -> None:
     for duration in (0.08, 0.04):
         out = tmp_path / f"{duration}.json"
         path = cases.file(duration=duration)
@@ -131,7 +137,7 @@ def test_a_few_ticks_are_not_enough(call: Any, capsys: Any, cases: Cases, tmp_pa
 
 
 @pytest.mark.slow
-def test_a_recording_that_was_cut_off(call: Any, cases: Cases, tmp_path: Path) -> None:
+def test_a_recording_that_was_cut_off_is_diagnosed(call: Any, cases: Cases, tmp_path: Path) -> None:
     content = cases.file(FRICTION, duration=10.0).read_bytes()
     cut, out = tmp_path / "cut.mcap", tmp_path / "cut.json"
     cut.write_bytes(content[: 2 * len(content) // 3])
@@ -143,7 +149,7 @@ def test_a_recording_that_was_cut_off(call: Any, cases: Cases, tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_a_test_that_a_limit_stopped(call: Any, tmp_path: Path) -> None:
+def test_a_test_that_a_limit_stopped_is_diagnosed(call: Any, tmp_path: Path) -> None:
     path, out = tmp_path / "a.mcap", tmp_path / "a.json"
     base = with_table(short(10.0), "limits", damper_stroke=0.03)
     entry = {"name": "damper.viscous", "factor": 1.5}
@@ -155,7 +161,7 @@ def test_a_test_that_a_limit_stopped(call: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_several_storeys(call: Any, tmp_path: Path) -> None:
+def test_a_recording_with_several_storeys_is_diagnosed(call: Any, tmp_path: Path) -> None:
     path, out = tmp_path / "a.mcap", tmp_path / "a.json"
     base = with_table(
         short(6.0), "structure", mass=[80e3, 80e3], stiffness=[37.5e6, 50e6], damping=[2e5, 2e5]
@@ -178,7 +184,9 @@ BENCHES = {
     [("actuator", True), ("table", False), ("damper", False)],
     ids=["actuator, clean", "table with an effect", "damper with an effect"],
 )
-def test_a_bench_test_of_one_part(call: Any, capsys: Any, tmp_path: Path, part: str, clean: bool) -> None:
+def test_a_bench_test_of_one_part_is_diagnosed(
+    call: Any, capsys: Any, tmp_path: Path, part: str, clean: bool
+) -> None:
     piece, effect, parameter = BENCHES[part]
     path, out, secret = tmp_path / "bench.mcap", tmp_path / "a.json", tmp_path / "r.toml"
     secret.write_text(f"[[effect]]\nname = '{effect}'\n{parameter}\n")
@@ -257,7 +265,9 @@ REALITIES = {
 
 
 @pytest.mark.parametrize("kind", REALITIES)
-def test_a_wrong_reality_is_one_sentence(call: Any, capsys: Any, tmp_path: Path, kind: str) -> None:
+def test_a_wrong_reality_is_refused_in_one_sentence(
+    call: Any, capsys: Any, tmp_path: Path, kind: str
+) -> None:
     text, message = REALITIES[kind]
     (tmp_path / "r.toml").write_text(text)
     (tmp_path / "lab.py").write_text("class Lab: ...\nclass Link: ...\n")
@@ -268,7 +278,7 @@ def test_a_wrong_reality_is_one_sentence(call: Any, capsys: Any, tmp_path: Path,
     assert not out.exists()
 
 
-def test_an_effect_leaves_no_trace_but_in_the_signals(cases: Cases) -> None:
+def test_an_effect_appears_in_a_recording_only_through_its_signals(cases: Cases) -> None:
     effects = {"column.friction": {"force": 913.0}, "link.delay": {"delay": 0.004}}
     real, clean = read(cases.file(effects, seed=0, duration=4.0)), read(cases.file(seed=0, duration=4.0))
     for name, facts in clean.metadata.items():

@@ -169,7 +169,7 @@ def litter(tmp_path: Path, virtual_recording: Path) -> None:
 
 @pytest.mark.usefixtures("litter")
 @pytest.mark.parametrize("line", MISTAKES)
-def test_a_mistake_is_one_sentence_and_exit_code_2(line: str, call: Call, capsys: Any) -> None:
+def test_a_mistake_gives_one_sentence_and_exit_code_2(line: str, call: Call, capsys: Any) -> None:
     assert call(line) == 2
     said = capsys.readouterr()
     assert said.out == ""

@@ -1,4 +1,4 @@
-"""The catalogue of recordings: what it says of each, how it is renewed, and what it answers."""
+"""The catalogue of recordings: its facts on each recording, its renewal, and its answers to queries."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Call = Callable[..., int]
 
 @pytest.fixture(scope="module")
 def folder(virtual_recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a whole recording, one of each defect, notes and a diagnosis report."""
+    """A folder with an intact recording, one of each defect, notes and a diagnosis report."""
     place = tmp_path_factory.mktemp("catalogue")
     (place / "deep").mkdir()
     shutil.copy(virtual_recording, place / "deep" / "whole.mcap")
@@ -55,7 +55,7 @@ def test_each_recording_has_its_state(base: sqlite3.Connection) -> None:
     assert states == expected | {os.path.join("deep", "whole.mcap"): "whole"}  # noqa: PTH118 - a name
 
 
-def test_facts_and_peaks_are_those_of_inspect(base: sqlite3.Connection, virtual_recording: Path) -> None:
+def test_facts_and_peaks_equal_those_of_inspect(base: sqlite3.Connection, virtual_recording: Path) -> None:
     summary = summarize(read(virtual_recording))
     facts = next(one for one in store.facts_of(base) if one["state"] == "whole")
     assert (facts["test"], facts["outcome"], facts["clock"]) == (summary["test"], "completed", "virtual")
@@ -68,7 +68,7 @@ def test_facts_and_peaks_are_those_of_inspect(base: sqlite3.Connection, virtual_
     assert peaks == {name: (one["peak"], one["unit"]) for name, one in summary["peaks"].items()}
 
 
-def test_peaks_that_no_metadata_hold_are_those_of_the_messages(
+def test_peaks_that_are_not_in_the_metadata_are_taken_from_the_messages(
     base: sqlite3.Connection, folder: Path
 ) -> None:
     run = read(folder / "cut.mcap")
@@ -76,7 +76,7 @@ def test_peaks_that_no_metadata_hold_are_those_of_the_messages(
     assert largest["cut.mcap"].value == abs(run.columns["master"]["column_force"]).max()
 
 
-def test_only_what_changed_is_read_again(folder: Path, tmp_path: Path) -> None:
+def test_only_changed_recordings_are_read_again(folder: Path, tmp_path: Path) -> None:
     place = shutil.copytree(folder, tmp_path / "copy")
     (place / store.NAME).unlink(missing_ok=True)
     assert renewal.renew([place]) == (4, 4, 0, 3)
@@ -117,7 +117,9 @@ def test_an_interrupted_renewal_leaves_the_catalogue_as_it_was(folder: Path, tmp
         ("scale != 0.5 and late < 1", ["whole"]),
     ],
 )
-def test_conditions(base: sqlite3.Connection, text: str, found: list[str]) -> None:
+def test_a_condition_finds_the_matching_recordings(
+    base: sqlite3.Connection, text: str, found: list[str]
+) -> None:
     condition = query.parsed(text, base)
     names = {Path(facts["file"]).stem for facts in store.facts_of(base, condition.sql, condition.values)}
     assert names == set(found)
@@ -150,7 +152,7 @@ def test_wrong_conditions_get_one_sentence(
 
 
 @given(st.text(max_size=30), st.sampled_from([one.name for one in COLUMNS if one.unit is None]))
-def test_no_text_is_taken_for_a_part_of_the_question(text: str, name: str) -> None:
+def test_a_text_in_a_condition_is_never_taken_for_sql(text: str, name: str) -> None:
     condition = query.of_text(BY_NAME[name], "~", text)
     memory = sqlite3.connect(":memory:")
     memory.execute(f"CREATE TABLE recordings ({name} TEXT)")
@@ -198,12 +200,14 @@ def test_notes_are_kept_beside_the_recording(call: Call, capsys: Any, folder: Pa
         (("show", "--tag", "a"), "--tag belongs to"),
     ],
 )
-def test_wrong_words_get_one_sentence(call: Call, capsys: Any, words: tuple[str, ...], said: str) -> None:
+def test_wrong_arguments_get_one_sentence(call: Call, capsys: Any, words: tuple[str, ...], said: str) -> None:
     assert call("catalog", *words) == 2
     assert said in capsys.readouterr().err
 
 
-def test_a_file_that_is_no_catalogue_is_said(call: Call, capsys: Any, tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_catalogue_is_refused_in_one_sentence(
+    call: Call, capsys: Any, tmp_path: Path
+) -> None:
     (tmp_path / store.NAME).write_text("something else that is longer than a head of SQLite" * 30)
     assert call("catalog", "show", "--in", tmp_path) == 2
     assert "Cannot use the catalogue" in capsys.readouterr().err

@@ -33,7 +33,7 @@ def velocity(t: Values = T) -> Values:
 
 
 def bare(status: str) -> Report:
-    """A report in which nothing was determined."""
+    """A report whose diagnosis determined nothing."""
     return {
         "version": 1,
         "status": status,
@@ -270,7 +270,7 @@ def details() -> Report:
 
 
 def laboratories() -> list[dict[str, Any]]:
-    """The default test's."""
+    """The laboratories of the default test."""
     return [
         {
             "role": "master",

@@ -1,4 +1,4 @@
-"""Realistic reports, as a diagnosis would write them."""
+"""Realistic reports, in the form that a diagnosis writes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The renderings of a diagnosis: schema, terminal and page, whole and with pieces missing."""
+"""The diagnosis report against its schema, on the terminal and as a page, complete and with missing pieces."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def text_of(html: str) -> str:
 
 @functools.cache
 def page_of(name: str) -> str:
-    """The page of one of the reports; drawing it takes long."""
+    """The page of one of the reports, drawn once because that takes long."""
     return page(read(fresh(name)))
 
 
@@ -76,20 +76,20 @@ def test_the_schema_refuses_a_report_with_a_fault(change: Report) -> None:
     assert not validator().is_valid(fresh("explained") | change)
 
 
-def test_the_schema_asks_for_every_key_of_the_contract() -> None:
+def test_the_schema_requires_every_specified_key() -> None:
     assert set(bare("no_gap")) == set(schema()["required"])
     assert {"verdict", "details", "parts", "found"} == set(schema()["properties"]) - set(schema()["required"])
 
 
 @pytest.mark.parametrize("name", REPORTS)
-def test_the_terminal_shows_one_look(name: str) -> None:
+def test_the_terminal_summary_fits_25_lines(name: str) -> None:
     lines = summary(read(fresh(name))).split("\n")
     assert len(lines) <= 25
     assert lines[0].startswith(wording.STATUS[name].upper())
     assert all(len(line) <= 125 for line in lines)
 
 
-def test_the_terminal_says_what_matters() -> None:
+def test_the_terminal_summary_contains_the_main_findings() -> None:
     text = " ".join(summary(read(fresh("explained"))).split())
     for words in (
         "91 % (86 … 95 %)",
@@ -111,7 +111,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_the_force_path_stands_on_the_terminal_and_the_page() -> None:
+def test_the_force_path_is_shown_on_the_terminal_and_on_the_page() -> None:
     report = fresh("explained")
     assert "force path" not in summary(read(report))
     report["details"]["force_path"] = {
@@ -128,7 +128,7 @@ def test_the_force_path_stands_on_the_terminal_and_the_page() -> None:
 
 
 @pytest.mark.parametrize("name", REPORTS)
-def test_the_page_stands_alone(name: str) -> None:
+def test_the_diagnosis_page_loads_nothing_from_elsewhere(name: str) -> None:
     html = page_of(name)
     check_alone(html)
     assert re.findall(r'<section id="([^"]+)"', html) == list(SECTIONS)
@@ -139,7 +139,7 @@ def test_the_page_stands_alone(name: str) -> None:
     assert re.search(r"\bnan\b|\bNone\b", html) is None
 
 
-def test_the_page_shows_every_picture_of_a_whole_report() -> None:
+def test_the_page_shows_every_picture_of_a_complete_report() -> None:
     html = page_of("explained")
     assert html.count("<figure") == 13
     assert (
@@ -154,7 +154,7 @@ def test_the_page_shows_every_picture_of_a_whole_report() -> None:
         assert words in html
 
 
-def test_pages_say_what_is_absent() -> None:
+def test_pages_state_which_parts_are_absent() -> None:
     assert "No part leaves a residual above its noise" in page_of("no_gap")
     poor = text_of(page_of("not_enough_data"))
     for words in (
@@ -171,7 +171,7 @@ def test_pages_say_what_is_absent() -> None:
 
 
 def texts_replaced(piece: Any, text: str) -> Any:
-    """The piece with every text replaced but the few words that the records list."""
+    """The piece with every text replaced except the values that the records enumerate."""
     if isinstance(piece, Entry):
         kinds = shapes(cast("Any", type(piece)))
         fields = {name: getattr(piece, name) for name, shape in kinds.items() if shape.kind != "choice"}
@@ -208,7 +208,7 @@ def pieces(piece: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 def empty(report: Report, path: tuple[Any, ...]) -> bool:
-    """Take one piece out of a report: null, nothing of its kind, or no such key; whether it may be missing so."""
+    """Remove one piece of a report (null, an empty value, or no key); returns whether the schema allows that."""
     place: Any = report
     for key in path[:-1]:
         place = place[key]
@@ -225,7 +225,7 @@ def empty(report: Report, path: tuple[Any, ...]) -> bool:
 @pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("name", ["explained", "unknown_effect"])
-def test_every_piece_may_be_missing(name: str) -> None:
+def test_a_report_with_any_missing_piece_still_gives_a_page(name: str) -> None:
     first = pieces(fresh("explained")) if name != "explained" else []
     for path in pieces(fresh(name)):
         if path[-1] in ("site", "effects") or path in first:
@@ -237,7 +237,7 @@ def test_every_piece_may_be_missing(name: str) -> None:
             assert len(summary(read(report)).split("\n")) <= 25
 
 
-def test_series_may_hold_gaps_and_differ_in_length() -> None:
+def test_series_may_contain_gaps_and_differ_in_length() -> None:
     report = fresh("explained")
     part = report["details"]["parts"][0]
     part["windows"]["ratio"][3:9] = [None] * 6
@@ -255,7 +255,7 @@ def test_a_report_in_which_nothing_was_determined_has_a_page() -> None:
     assert "not determined" in summary(report)
 
 
-def test_names_become_words() -> None:
+def test_names_of_effects_and_sites_are_written_in_words() -> None:
     assert wording.effect("sensor.column_force.gain") == "gain of the column force sensor"
     assert wording.effect("damper.stroke_stop") == "damper stroke stop"
     assert wording.site("sensor.damper_force") == "damper force sensor"
@@ -269,7 +269,7 @@ def test_names_become_words() -> None:
 
 
 @pytest.mark.parametrize("status", wording.STATUS)
-def test_a_report_without_a_verdict_gets_one(status: str) -> None:
+def test_a_report_without_a_verdict_gets_one_in_words(status: str) -> None:
     report = read(fresh("explained") | {"status": status, "verdict": ""})
     assert wording.verdict(report).endswith(".")
     assert "–" not in wording.verdict(report)
@@ -288,7 +288,7 @@ def seen(monkeypatch: Any) -> list[Any]:
     return found
 
 
-def test_no_label_of_a_picture_is_cut_off_and_no_factor_stands_above_an_axis(monkeypatch: Any) -> None:
+def test_no_label_of_a_picture_is_cut_off_and_no_axis_shows_a_factor(monkeypatch: Any) -> None:
     canvases = seen(monkeypatch)
     report = fresh("explained")
     moved = Tolerance(factor=1.0, z=2.0)
@@ -308,7 +308,7 @@ def test_no_label_of_a_picture_is_cut_off_and_no_factor_stands_above_an_axis(mon
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_an_effect_that_is_listed_twice_is_said_once() -> None:
+def test_an_effect_that_is_listed_twice_is_shown_once() -> None:
     report = fresh("explained")
     first = report["details"]["candidates"][0]
     report["details"]["candidates"].append(first | {"probability": 0.001})

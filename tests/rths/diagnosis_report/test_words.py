@@ -26,7 +26,7 @@ from report.text.formats import (
 from tests.rths.diagnosis_report.reports import fresh
 
 
-def test_quantities_read_as_in_the_field() -> None:
+def test_quantities_are_written_in_the_fields_units() -> None:
     assert quantity(0.0012, "m") == "1.20 mm"
     assert quantity(5.3e-6, "m") == "5.30 µm"
     assert quantity(18.75e6, "N/m") == "18.8 MN/m"
@@ -62,7 +62,7 @@ def candidate(*names: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("others", [(), ("damper.friction",)])
-def test_no_word_of_an_effect_is_said_twice(others: tuple[str, ...]) -> None:
+def test_no_word_is_repeated_in_the_name_of_an_effect(others: tuple[str, ...]) -> None:
     explained = fresh("explained")
     for name in CATALOGUE:
         report = read(explained | {"which": [candidate(name, *others)]})
@@ -76,7 +76,7 @@ def test_no_word_of_an_effect_is_said_twice(others: tuple[str, ...]) -> None:
             assert not re.search(r"\b([a-z]{2,})\W+\1\b", setting), setting
 
 
-def test_numbers_that_say_nothing_are_not_written_out() -> None:
+def test_meaningless_digits_and_bounds_are_left_out() -> None:
     assert quantity(-1e-15, "s") == "0 s"
     assert quantity(3.0, "N", [None, None]) == "3.00 N"
     assert quantity(3.0, "N", [None, 4.0]) == "3.00 N (up to 4.00)"
@@ -88,7 +88,7 @@ def test_numbers_that_say_nothing_are_not_written_out() -> None:
     assert axis_unit("column displacement (m)", 2e-3) == (1e3, "column displacement (mm)")
 
 
-def test_no_more_than_the_whole_gap_is_said_to_close() -> None:
+def test_the_closed_share_of_a_gap_is_shown_as_at_most_100_percent() -> None:
     report = fresh("explained")
     report["how_far"] |= {"closed": 1.01, "closed_interval": [0.93, 1.09]}
     found = read(report)

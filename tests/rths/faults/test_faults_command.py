@@ -19,7 +19,7 @@ def parsed(*words: str) -> argparse.Namespace:
     return parser_for("faults").parse_args(words)
 
 
-def test_a_calm_schedule_passes_and_shows_its_course(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_schedule_without_faults_passes_and_prints_its_course(capsys: pytest.CaptureFixture[str]) -> None:
     assert faults.run(parsed("--schedule", "seed=4 duration=0.3")) == 0
     told = capsys.readouterr().out
     assert "seed=4 duration=0.3 slaves=1 recorded=0" in told
@@ -27,7 +27,7 @@ def test_a_calm_schedule_passes_and_shows_its_course(capsys: pytest.CaptureFixtu
     assert "violations: 0 in 0 schedules" in told
 
 
-def test_many_schedules_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+def test_many_schedules_are_reported_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     code = faults.run(parsed("--seed", "3", "--schedules", "3", "--duration", "1", "--json"))
     found = json.loads(capsys.readouterr().out)
     assert code == bool(found["violations"])
@@ -36,7 +36,7 @@ def test_many_schedules_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert sum(found["faults"].values()) == sum(len(schedule.draw(seed, 1.0).faults) for seed in (3, 4, 5))
 
 
-def test_a_violation_gives_exit_1_and_the_line_that_plays_it_again(
+def test_a_violation_gives_exit_code_1_and_the_line_that_repeats_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def judge(_simulation: Simulation) -> list[InvariantViolation]:
@@ -58,7 +58,7 @@ def test_a_violation_gives_exit_1_and_the_line_that_plays_it_again(
         ([], list(range(1, 101))),
     ],
 )
-def test_which_schedules_are_played(words: list[str], chosen: list[int]) -> None:
+def test_the_arguments_select_the_schedules_that_are_played(words: list[str], chosen: list[int]) -> None:
     assert [one.seed for one in faults.schedules(parsed(*words))] == chosen
 
 
@@ -66,6 +66,6 @@ def test_which_schedules_are_played(words: list[str], chosen: list[int]) -> None
     "words",
     [["--seed", "-1"], ["--schedules", "0"], ["--duration", "0.1"], ["--jobs", "0"], ["--schedule", "no"]],
 )
-def test_what_makes_no_trial_is_said_in_one_sentence(words: list[str]) -> None:
+def test_arguments_that_give_no_schedule_are_refused_in_one_sentence(words: list[str]) -> None:
     with pytest.raises(InputError):
         faults.schedules(parsed(*words))

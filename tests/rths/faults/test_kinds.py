@@ -25,14 +25,14 @@ def simulation_of(name: str) -> Simulation:
 
 
 @pytest.mark.parametrize("name", ["single_site", "two_columns", "two_slaves"])
-def test_in_a_perfect_world_every_shape_of_test_keeps_what_must_hold(name: str) -> None:
+def test_without_faults_every_shape_of_test_satisfies_the_invariants(name: str) -> None:
     simulation = simulation_of(name)
     simulation.run()
     assert judge(simulation) == []
     assert {loop.completed for loop in simulation.loops.values()} == {True}
 
 
-def test_a_killed_column_slave_leaves_the_master_at_rest() -> None:
+def test_after_a_column_slave_is_killed_the_master_comes_to_rest() -> None:
     simulation = simulation_of("two_columns")
     simulation.world.at(round(0.6e9), simulation.world.processes["slave.east"].kill)
     simulation.run()
@@ -40,7 +40,7 @@ def test_a_killed_column_slave_leaves_the_master_at_rest() -> None:
     assert simulation.loops["master"].lab.safety.mode is Mode.SAFE
 
 
-def test_a_feedback_of_another_count_of_channels_is_rejected() -> None:
+def test_a_feedback_with_another_number_of_channels_is_rejected() -> None:
     simulation = simulation_of("two_columns")
     plan = simulation.plan
     route = next(

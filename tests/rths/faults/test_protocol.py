@@ -59,7 +59,7 @@ TYPES: dict[Any, st.SearchStrategy[Any]] = {
 
 
 def any_of(kind: Any) -> st.SearchStrategy[Message]:
-    """Messages of a kind with whatever fields the codec lets through."""
+    """Messages of a kind with any fields that the codec accepts."""
     given = {
         name: FIELDS.get(name, STAMPS if name.endswith("_ns") else TYPES[hint])
         for name, hint in get_type_hints(kind).items()
@@ -97,7 +97,7 @@ class Sent:
 
 
 class Laboratory(RuleBasedStateMachine):
-    """What holds for both laboratories."""
+    """The rules and invariants that both laboratories share."""
 
     role = ""
     loop: MasterLoop | SlaveLoop
@@ -171,7 +171,7 @@ class Laboratory(RuleBasedStateMachine):
 
 
 def reachable(state: State) -> set[State]:
-    """Where one can be after any number of events."""
+    """The states that are reachable from a state by any number of events."""
     found, left = {state}, [state]
     while left:
         for target in TRANSITIONS[left.pop()].values():
@@ -183,7 +183,7 @@ def reachable(state: State) -> set[State]:
 
 
 class SlaveMachine(Laboratory):
-    """A slave whose master keeps to the protocol, mostly."""
+    """A slave whose master mostly follows the protocol."""
 
     role = SLAVE
 
@@ -231,7 +231,7 @@ class SlaveMachine(Laboratory):
 
 
 class MasterMachine(Laboratory):
-    """A master whose slave keeps to the protocol, mostly."""
+    """A master whose slave mostly follows the protocol."""
 
     role = MASTER
 
@@ -246,7 +246,7 @@ class MasterMachine(Laboratory):
 
     @rule()
     def handshake(self) -> None:
-        """The slave's answer to what was asked last."""
+        """The slave's answer to the last request."""
         self.loop.poll()
         asked = self.endpoint.messages[-1] if self.endpoint.messages else None
         now = self.process.now()

@@ -1,4 +1,4 @@
-"""Schedules: drawn, written, read."""
+"""Schedules of faults are drawn, written and read."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from validation.faults.schedule import KINDS, InjectedFault, Schedule, draw, par
 MANY = 300
 
 
-def test_a_schedule_comes_out_of_its_line_as_it_went_in() -> None:
+def test_a_schedule_is_the_same_after_being_written_and_read() -> None:
     for seed in range(MANY):
         for recorded in (False, True):
             schedule = draw(seed, recorded=recorded)
@@ -18,7 +18,7 @@ def test_a_schedule_comes_out_of_its_line_as_it_went_in() -> None:
             assert "\n" not in str(schedule)
 
 
-def test_the_same_seed_gives_the_same_and_all_kinds_come_up() -> None:
+def test_the_same_seed_gives_the_same_schedule_and_all_kinds_of_faults_occur() -> None:
     schedules = [draw(seed) for seed in range(MANY)]
     assert schedules == [draw(seed) for seed in range(MANY)]
     assert {fault.kind for one in schedules for fault in one.faults} == set(KINDS)
@@ -29,14 +29,14 @@ def test_the_same_seed_gives_the_same_and_all_kinds_come_up() -> None:
     assert any("recorder" in str(draw(seed, recorded=True)) for seed in range(20))
 
 
-def test_a_length_that_is_given_moves_the_faults_into_it() -> None:
+def test_a_given_duration_moves_the_faults_into_it() -> None:
     for seed in range(20):
         schedule = draw(seed, 5.0)
         assert schedule.duration == 5.0
         assert all(fault.at <= 5.0 for fault in schedule.faults)
 
 
-def test_a_line_may_be_written_by_hand() -> None:
+def test_a_schedule_may_be_written_by_hand() -> None:
     found = parse("seed=3 duration=2 outage@0.5+0.1:master>slave loss@1+1:master<>slave(loss=0.1)")
     outage = InjectedFault("outage", "master>slave", 0.5, 0.1)
     loss = InjectedFault("loss", "master<>slave", 1.0, 1.0, {"loss": 0.1})
@@ -59,6 +59,6 @@ def test_a_line_may_be_written_by_hand() -> None:
         ("seed=x", "is not a number"),
     ],
 )
-def test_a_line_that_is_none_is_said_in_one_sentence(line: str, part: str) -> None:
+def test_a_wrong_schedule_is_refused_in_one_sentence(line: str, part: str) -> None:
     with pytest.raises(InputError, match=part):
         parse(line)

@@ -46,7 +46,9 @@ def commands(simulation: Simulation, role: str) -> np.ndarray[tuple[int, int], n
     return np.array(simulation.probes[role].log.commands)
 
 
-def test_a_perfect_world_equals_virtual_time_to_the_bit(short_plan: Plan, virtual_recording: Path) -> None:
+def test_a_simulation_without_faults_equals_virtual_time_to_the_last_bit(
+    short_plan: Plan, virtual_recording: Path
+) -> None:
     plan = without_recorder(short_plan)
     surrounding = Surrounding(drifts={SLAVE: Drift(3_600 * 10**9, 50_000)})
     simulation = Simulation(plan, as_planned(plan), surrounding)
@@ -59,7 +61,7 @@ def test_a_perfect_world_equals_virtual_time_to_the_bit(short_plan: Plan, virtua
     assert slave[: plan.ticks, 1].tobytes() == found.columns["slave"]["damper_command"].tobytes()
 
 
-def test_the_same_schedule_gives_the_same_bits_and_another_seed_others() -> None:
+def test_the_same_schedule_gives_the_same_bits_and_another_seed_different_ones() -> None:
     line = (
         "duration=1.5 loss@0.3+1:master<>slave(loss=0.1) stall@0.9+0.01:slave "
         "delay@1+0.4:slave>master(minimum=0.001,mean=0.001)"
@@ -71,7 +73,7 @@ def test_the_same_schedule_gives_the_same_bits_and_another_seed_others() -> None
     ]
 
 
-def test_several_slaves_take_part() -> None:
+def test_several_slaves_take_part_in_a_simulation() -> None:
     simulation = play("seed=1 duration=1 slaves=2")
     assert judge(simulation) == []
     assert {role: loop.ticks for role, loop in simulation.loops.items()} == {
@@ -81,7 +83,7 @@ def test_several_slaves_take_part() -> None:
     }
 
 
-def test_a_killed_master_is_noticed() -> None:
+def test_a_killed_master_is_detected() -> None:
     simulation = play("seed=1 duration=3 kill@1:master")
     slave = simulation.loops[SLAVE].lab
     assert slave.error is not None
@@ -93,7 +95,7 @@ def test_a_killed_master_is_noticed() -> None:
     assert judge(simulation, HOLDING_NOW) == []
 
 
-def test_a_stop_reaches_both() -> None:
+def test_a_stop_reaches_both_laboratories() -> None:
     simulation = play("seed=1 duration=3 stop@1:master")
     assert simulation.loops[MASTER].lab.exchange.cause.startswith("stopped by the user")
     assert simulation.loops[MASTER].ticks == pytest.approx(simulation.loops[SLAVE].ticks, abs=2)
@@ -101,7 +103,7 @@ def test_a_stop_reaches_both() -> None:
     assert judge(simulation, HOLDING_NOW) == []
 
 
-def test_damaged_frames_are_rejected_and_accounted() -> None:
+def test_damaged_frames_are_rejected_and_counted() -> None:
     simulation = play("seed=1 duration=2 corrupt@0.5+2:master<>slave(corrupt=0.1)")
     assert judge(simulation, HOLDING_NOW) == []
     for role in (MASTER, SLAVE):
@@ -110,7 +112,7 @@ def test_damaged_frames_are_rejected_and_accounted() -> None:
         assert sum(rejected.values()) == rejected[Reject.CHECK.value]
 
 
-def test_strangers_without_the_keys_change_nothing() -> None:
+def test_frames_of_strangers_without_the_keys_change_nothing() -> None:
     plain = play("seed=1 duration=1.5")
     disturbed = play(
         "seed=1 duration=1.5 garbage@0.01:master<>slave(count=300) garbage@1:master<>slave(count=300) "
@@ -133,7 +135,7 @@ def test_replayed_frames_change_nothing() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_of_fault_can_happen_and_what_holds_now_holds(kind: str) -> None:
+def test_every_kind_of_fault_can_be_simulated_without_violating_an_invariant(kind: str) -> None:
     lasts = 0.05 if KINDS[kind].lasts else 0.0
     where = {"route": "master<>slave", "process": SLAVE, "rig": SLAVE}[KINDS[kind].where]
     values = ",".join(f"{name}={SOME.get(name, 0.2)}" for name in KINDS[kind].parameters)
@@ -149,7 +151,7 @@ def test_a_stranger_with_all_keys_moves_no_rig_beyond_its_limits(what: int) -> N
 
 
 @pytest.mark.parametrize("fault", ["kill@0.5:master", "kill@0.7:recorder", "outage@0.6+0.02:slave<>recorder"])
-def test_a_recording_can_be_read_whatever_happens(fault: str, tmp_path: Path) -> None:
+def test_a_recording_is_readable_after_any_schedule(fault: str, tmp_path: Path) -> None:
     simulation = play(f"seed=1 duration=1 recorded=1 {fault}", tmp_path / "test.mcap")
     assert judge(simulation, HOLDING_NOW) == []
     found = read(tmp_path / "test.mcap")
@@ -190,7 +192,7 @@ def calm() -> Simulation:
     return simulation
 
 
-def test_what_is_broken_on_purpose_is_seen(calm: Simulation) -> None:
+def test_deliberate_violations_are_detected(calm: Simulation) -> None:
     log = calm.probes[SLAVE].log
     log.commands[100] = (float("nan"), 0.0)
     assert len(found(calm, invariants.commands_within_limits)) == 1
@@ -205,7 +207,7 @@ def test_what_is_broken_on_purpose_is_seen(calm: Simulation) -> None:
     assert len(found(calm, invariants.everybody_ends)) == 2
 
 
-def test_broken_accounts_are_seen(calm: Simulation) -> None:
+def test_wrong_message_accounts_are_detected(calm: Simulation) -> None:
     calm.endpoints[SLAVE].rejected["check"] += 1
     calm.ports[MASTER].taken["Feedback"] -= 1
     assert len(found(calm, invariants.frames_add_up)) == 2
@@ -218,14 +220,14 @@ def test_broken_accounts_are_seen(calm: Simulation) -> None:
     assert len(found(calm, invariants.numbers_add_up)) == 1
 
 
-def test_a_latch_that_opens_is_seen(calm: Simulation) -> None:
+def test_a_latch_that_opens_is_detected(calm: Simulation) -> None:
     modes = calm.probes[MASTER].log.modes
     modes[0] = calm.loops[MASTER].lab.exchange.state  # done
     assert named(modes[0]) == "SAFE"
     assert len(found(calm, invariants.latched_stays)) == 1
 
 
-def test_who_runs_on_without_messages_is_seen(calm: Simulation) -> None:
+def test_a_laboratory_that_runs_on_without_messages_is_detected(calm: Simulation) -> None:
     arrivals = invariants.tick_routes(calm, SLAVE)[0].ledger.arrivals
     del arrivals[50:54]
     assert found(calm, invariants.nobody_runs_unheard) == []

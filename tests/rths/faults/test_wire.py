@@ -23,7 +23,7 @@ class Line(NamedTuple):
     packets: list[Packet]
 
     def send(self, count: int, every: int = MS) -> None:
-        """Frames at a steady pace from now on, and all that comes of them."""
+        """Sends frames at a steady rate and lists all that arrive."""
         start = self.world.time
         for number in range(count):
             time = start + number * every
@@ -57,7 +57,7 @@ def played(conditions: Conditions, count: int = COUNT) -> Line:
     return found
 
 
-def test_delay_is_a_minimum_and_an_exponential_on_top() -> None:
+def test_a_delay_is_a_minimum_plus_an_exponential_part() -> None:
     found = played(Conditions(minimum=0.002, mean=0.0001))
     delays = np.array([time - sent for time, _, sent, _, _ in found.direction.ledger.arrivals]) * 1e-9
     assert delays.min() == pytest.approx(0.002, abs=1e-7)
@@ -66,7 +66,7 @@ def test_delay_is_a_minimum_and_an_exponential_on_top() -> None:
     assert found.numbers() == list(range(COUNT))
 
 
-def test_single_losses_and_losses_in_runs_have_their_share_and_length() -> None:
+def test_single_losses_and_bursts_have_the_given_share_and_length() -> None:
     single, runs = played(Conditions(loss=0.05)), played(Conditions(burst=0.05, run=8.0))
     for found in (single, runs):
         assert found.counts()["lost"] / COUNT == pytest.approx(0.05, rel=0.25)
@@ -76,7 +76,7 @@ def test_single_losses_and_losses_in_runs_have_their_share_and_length() -> None:
     assert np.mean(lengths) == pytest.approx(8.0, rel=0.3)
 
 
-def test_duplicates_corruption_and_disorder_have_their_shares() -> None:
+def test_duplicates_corruption_and_reordering_have_the_given_shares() -> None:
     found = played(Conditions(duplicate=0.1, corrupt=0.05, reorder=0.02, hold=0.005))
     counts = found.counts()
     assert counts["duplicated"] / COUNT == pytest.approx(0.1, rel=0.1)
@@ -93,7 +93,7 @@ def test_duplicates_corruption_and_disorder_have_their_shares() -> None:
 
 
 @pytest.mark.parametrize(("state", "there"), [(QUEUES, 100), (DROPS, 50)])
-def test_an_outage_keeps_frames_as_tcp_does_or_loses_them(state: str, there: int) -> None:
+def test_an_outage_queues_frames_as_tcp_does_or_loses_them(state: str, there: int) -> None:
     found = line(Conditions())
     found.send(100)
     found.world.at(25 * MS, found.direction.lay, "outage", Conditions(state=state))
@@ -115,7 +115,7 @@ def test_a_backlog_is_bounded() -> None:
     assert found.counts()["lost"] == 7
 
 
-def test_impairments_at_once_add_up_and_leave_nothing_behind() -> None:
+def test_simultaneous_impairments_add_up_and_end_completely() -> None:
     found = line(Conditions(minimum=0.001))
     found.direction.lay("more", Conditions(minimum=0.002, loss=0.5))
     both = Conditions(loss=0.5).over(Conditions(loss=0.5, state=QUEUES)).over(Conditions(state=DROPS))
@@ -128,7 +128,7 @@ def test_impairments_at_once_add_up_and_leave_nothing_behind() -> None:
     assert found.counts() == {"sent": 100, "delivered": 100}
 
 
-def test_draws_depend_on_seed_and_direction_alone() -> None:
+def test_draws_depend_on_seed_and_direction_only() -> None:
     def lost(seed: int) -> list[int]:
         found = line(Conditions(loss=0.1), seed)
         found.send(500)
@@ -139,7 +139,7 @@ def test_draws_depend_on_seed_and_direction_alone() -> None:
     assert lost(1) != lost(2)
 
 
-def test_what_comes_while_its_hearer_stands_still_waits_in_a_socket() -> None:
+def test_frames_for_a_paused_process_wait_in_its_socket() -> None:
     found = line()
     found.send(SOCKET + 100)
     process = found.direction.hearer.process
@@ -150,7 +150,7 @@ def test_what_comes_while_its_hearer_stands_still_waits_in_a_socket() -> None:
     assert found.counts()["overflow"] == 100 - 11
 
 
-def test_replayed_frames_come_again_and_are_told_from_sent_ones() -> None:
+def test_replayed_frames_arrive_again_and_are_counted_separately() -> None:
     found = line()
     found.send(10)
     found.world.at(50 * MS, found.direction.again, 4)

@@ -1,4 +1,4 @@
-"""Recordings of made-up latency: a machine's noise, the same for the test and for the bare loop beside it."""
+"""Recordings with made-up latency; the test and the bare loop beside it have the same machine's noise."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SPIKES = {"ordinary": 0.008, "fifo": 0.0005}  # share of waits in which another 
 
 
 class Machine:
-    """What it takes a thread to wake: mostly tens of microseconds, now and then a spike."""
+    """The wake-up times of threads on a machine: mostly tens of microseconds, with occasional spikes."""
 
     def __init__(self, seed: int, ticks: int, scheduler: str = "ordinary") -> None:
         self.random = np.random.default_rng(seed)
@@ -32,7 +32,7 @@ class Machine:
 
 
 def columns(machine: Machine, delayed: Any = 0.0) -> dict[str, Any]:
-    """Latency of every tick; `delayed` (s) is what the feedback takes longer."""
+    """The latency of every tick; `delayed` (s) is added to the feedback."""
     found = {"wake_lateness": machine.wait(), "compute_time": machine.body(40e-6)}
     for name in ("command_one_way", "slave_time", "feedback_one_way"):
         found[name] = machine.body(50e-6) + machine.wait()
@@ -85,13 +85,13 @@ def keep(result: Run, topic: str, rows: Any) -> Run:
 
 
 def clean(seed: int, ticks: int, scheduler: str = "ordinary") -> Run:
-    """Noise only."""
+    """A recording with noise only."""
     machine = Machine(seed, ticks, scheduler)
     return run(columns(machine), bare_loop(machine))
 
 
 def delayed(seed: int, ticks: int, scheduler: str = "ordinary") -> Run:
-    """Noise, and 2 % of the feedback one millisecond later."""
+    """A recording with noise in which 2 % of the feedback comes one millisecond later."""
     machine = Machine(seed, ticks, scheduler)
     extra = np.zeros(ticks)
     extra[machine.random.choice(ticks, ticks // 50, replace=False)] = 1e-3

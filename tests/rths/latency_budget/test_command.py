@@ -50,7 +50,7 @@ def recorded(plan: Plan, folder: Path, options: str) -> Path:
         "{ delay = 3e-3, every = 50 }",
     ],
 )
-def test_a_recording_with_two_percent_of_delays_is_over(
+def test_a_recording_with_two_percent_of_delays_is_over_its_budget(
     options: str, call: Any, capsys: Any, short_plan: Plan, tmp_path: Path
 ) -> None:
     path = recorded(with_test(short_plan, duration=5.0), tmp_path, options)
@@ -63,7 +63,7 @@ def test_a_recording_with_two_percent_of_delays_is_over(
     assert report["bare_loop"] is None
 
 
-def test_rare_delays_are_within_and_a_strict_budget_sees_them(
+def test_rare_delays_are_within_the_default_budget_and_over_a_strict_one(
     call: Any, capsys: Any, short_plan: Plan, tmp_path: Path
 ) -> None:
     path = recorded(short_plan, tmp_path, "{ delay = 1e-3, every = 400 }")
@@ -74,7 +74,7 @@ def test_rare_delays_are_within_and_a_strict_budget_sees_them(
     assert capsys.readouterr().out.splitlines()[-1] == "over the budget: longest gap"
 
 
-def test_mistakes_are_one_sentence_and_exit_2(
+def test_mistakes_give_one_sentence_and_exit_code_2(
     call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
 ) -> None:
     assert call(tmp_path / "no.mcap") == 2

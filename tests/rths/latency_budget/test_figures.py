@@ -24,14 +24,14 @@ times = st.floats(0.0, 0.1)
 
 
 @given(st.lists(st.booleans(), max_size=60))
-def test_the_longest_gap_is_that_of_a_naive_count(flags: list[bool]) -> None:
+def test_the_longest_gap_agrees_with_a_naive_count(flags: list[bool]) -> None:
     spans = itertools.combinations(range(len(flags) + 1), 2)
     naive = max((last - first for first, last in spans if all(flags[first:last])), default=0)
     assert longest_run(np.array(flags, dtype=bool)) == naive
 
 
 @given(st.lists(st.one_of(times, st.just(float("nan"))), min_size=1, max_size=200))
-def test_percentiles_are_those_of_the_ticks_that_were_measured(values: list[float]) -> None:
+def test_percentiles_cover_only_measured_ticks(values: list[float]) -> None:
     kept = np.array([value for value in values if value == value])  # noqa: PLR0124 - NaN is not itself
     found = figures(noisy.run({"round_trip": values})).exchanges[0]
     if not kept.size:
@@ -63,7 +63,7 @@ def test_the_bare_loops_share_passes_through_its_percentiles_down_to_one_tick_at
     assert bare.longest_gap == 1
 
 
-def test_ticks_that_passed_in_a_standstill_are_no_part_of_that_share() -> None:
+def test_ticks_that_passed_during_a_pause_do_not_count_in_the_bare_loops_share() -> None:
     percentiles = {"p50": 5e-5, "p90": 1e-4, "p99": 2e-2, "p99.9": 4e-2}
     bare = Bare(4900, 100, 2e-3, percentiles, 5e-2)
     assert bare.late_share == 0.02
@@ -73,13 +73,13 @@ def test_ticks_that_passed_in_a_standstill_are_no_part_of_that_share() -> None:
     assert bare.share_beyond(2e-3) == 0.0
 
 
-def test_a_tick_is_calm_where_the_master_woke_in_time_at_both_its_ends() -> None:
+def test_a_tick_counts_as_undisturbed_if_the_master_woke_in_time_at_both_its_ends() -> None:
     run = noisy.run({"wake_lateness": [1e-4, 1e-4, 5e-3, 1e-4, np.nan, 1e-4], "round_trip": [1e-4] * 6})
     assert figures(run).exchanges[0].calm(2e-3).tolist() == [True, False, False, True, True, True]
     assert figures(noisy.run({"round_trip": [1e-4]})).exchanges[0].calm(2e-3).tolist() == [True]
 
 
-def test_a_bare_loop_is_read_from_texts_and_left_out_where_they_are_not_all_there() -> None:
+def test_a_bare_loop_is_read_from_metadata_and_left_out_if_incomplete() -> None:
     record = noisy.bare_loop(noisy.Machine(1, 2500))
     found = bare_loop(record)
     assert found is not None
@@ -92,14 +92,14 @@ def test_a_bare_loop_is_read_from_texts_and_left_out_where_they_are_not_all_ther
     assert bare_loop(record | {"bare_loop.interval": "0.0"}) is None
 
 
-def test_laboratories_say_what_the_host_took() -> None:
+def test_stolen_time_and_schedulers_are_read_for_each_laboratory() -> None:
     record = {"master.stolen_share": "0.25", "slave.stolen_share": "nan", "slave.scheduler": "fifo 50"}
     found = figures(noisy.run({"round_trip": [1e-3]}, record))
     assert found.stolen == {"master": 0.25}
     assert found.schedulers == {"slave": "fifo 50"}
 
 
-def test_events_say_the_same_where_there_is_no_metadata_record() -> None:
+def test_events_replace_a_missing_metadata_record() -> None:
     run = noisy.run({"round_trip": [1e-3]})
     record = noisy.bare_loop(noisy.Machine(1, 2500))
     bare = {name.removeprefix("bare_loop."): float(value) for name, value in record.items()}
@@ -117,7 +117,7 @@ def test_events_say_the_same_where_there_is_no_metadata_record() -> None:
     assert found.schedulers == {"master": "fifo 50", "slave": "other"}
 
 
-def test_every_slave_is_an_exchange_of_its_own() -> None:
+def test_every_slave_has_its_own_exchange() -> None:
     run = noisy.run({"round_trip": [1e-3]}, topic="latency.west")
     noisy.add(run, "latency.east", {"round_trip": [2e-3, 3e-3]})
     found = [(item.name, item.ticks, item.unrecorded) for item in figures(run).exchanges]
@@ -137,7 +137,7 @@ def test_a_recording_without_latency_is_refused() -> None:
         figures(run)
 
 
-def test_holes_and_a_cut_are_said() -> None:
+def test_gaps_and_a_cut_off_end_are_reported() -> None:
     run = noisy.run({"round_trip": [1e-3, 1e-3, 1e-3]})
     assert figures(run).warnings == []
     run.sequences["latency"], run.finished = np.array([1, 2, 4]), False
@@ -147,7 +147,7 @@ def test_holes_and_a_cut_are_said() -> None:
     ]
 
 
-def test_an_end_before_the_planned_one_is_said() -> None:
+def test_an_end_before_the_planned_one_is_reported() -> None:
     run = noisy.ticked(noisy.run({"round_trip": [1e-3] * 300}), 300)
     assert figures(run).warnings == []
     run.metadata["summary"]["ticks_expected"] = "1166"
@@ -156,7 +156,7 @@ def test_an_end_before_the_planned_one_is_said() -> None:
     ]
 
 
-def test_rows_stand_at_their_ticks_whatever_their_order_in_the_file() -> None:
+def test_rows_belong_to_their_ticks_whatever_their_order_in_the_file() -> None:
     found = {"round_trip": [3e-3, 1e-3], "deadline_missed": [True, False], "command_sent_ns": [0, 1]}
     run = noisy.ticked(noisy.run(found), 4)
     run.sequences["latency"] = np.array([3, 1])
@@ -169,7 +169,7 @@ def test_rows_stand_at_their_ticks_whatever_their_order_in_the_file() -> None:
     assert item.missed.tolist() == [False, True]
 
 
-def test_without_flags_in_the_file_ticks_without_a_row_are_late_all_the_same() -> None:
+def test_ticks_without_a_row_count_as_late_even_without_flags_in_the_file() -> None:
     item = figures(noisy.ticked(noisy.run({"round_trip": [1e-3] * 3}), 5)).exchanges[0]
     assert item.late is not None
     assert item.late.tolist() == [False] * 3 + [True] * 2
@@ -193,7 +193,7 @@ def old_recording(path: Path, ticks: int, *, close: bool = True) -> Recording:
     return recording
 
 
-def test_a_file_with_fewer_columns_gives_what_it_has(tmp_path: Path) -> None:
+def test_a_file_with_fewer_columns_gives_the_figures_of_those(tmp_path: Path) -> None:
     old_recording(tmp_path / "old.mcap", 100)
     found = figures(read(tmp_path / "old.mcap")).exchanges[0]
     assert found.segments.keys() == {"feedback_one_way"}
@@ -203,7 +203,7 @@ def test_a_file_with_fewer_columns_gives_what_it_has(tmp_path: Path) -> None:
     assert found.missed is None
 
 
-def test_a_file_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+def test_a_file_that_was_cut_off_is_read_up_to_the_cut(tmp_path: Path) -> None:
     recording = old_recording(tmp_path / "cut.mcap", 100, close=False)
     found = figures(read(tmp_path / "cut.mcap"))
     assert found.exchanges[0].ticks == 100

@@ -57,14 +57,14 @@ def test_clean_recordings_are_within_and_delayed_ones_over_ten_times_out_of_ten(
 
 
 @pytest.mark.parametrize("name", ["command_one_way", "slave_time"])
-def test_a_delay_of_the_command_or_in_the_slave_is_seen_too(name: str) -> None:
+def test_a_delay_of_the_command_or_in_the_slave_is_detected(name: str) -> None:
     for seed in range(10):
         run = noisy.clean(seed, 2500)
         run.columns["latency"][name][::50] += 1e-3
         assert check(verdict(run), f"{name} p99").verdict == "over"
 
 
-def test_without_a_bare_loop_limits_stand_alone() -> None:
+def test_without_a_bare_loop_the_limits_are_used_unchanged() -> None:
     run = noisy.delayed(1, 2500)
     run.metadata = {}
     report = verdict(run)
@@ -100,13 +100,13 @@ NOISE = record(
 TAIL = {"feedback_one_way": {"p99": 0.6e-3}}
 
 
-def test_what_the_bare_loop_suffered_too_is_in_doubt() -> None:
+def test_a_delay_that_the_bare_loop_also_had_is_not_judged() -> None:
     report = verdict(noisy.run(late_in(0.015, 1.5e-3), NOISE), TAIL)
     assert (report.status, report.exit_code) == ("not_judged", 0)
     assert check(report, "feedback_one_way p99").verdict == "doubt"
 
 
-def test_what_the_bare_loop_did_not_suffer_is_over() -> None:
+def test_a_delay_that_the_bare_loop_did_not_have_is_over() -> None:
     assert verdict(noisy.run(late_in(0.015, 1.5e-3), record()), TAIL).status == "over"
     assert verdict(noisy.run(late_in(0.08, 1.5e-3), NOISE), TAIL).status == "over"
 
@@ -118,7 +118,9 @@ def test_what_the_bare_loop_did_not_suffer_is_over() -> None:
         (record(late=150.0), "The bare loop itself was late in 2.91 % of its ticks: beyond 2.00 % nothing"),
     ],
 )
-def test_an_unfit_machine_allows_no_verdict_on_what_is_over(changed: dict[str, str], reason: str) -> None:
+def test_on_an_unfit_machine_a_value_over_its_limit_is_not_judged(
+    changed: dict[str, str], reason: str
+) -> None:
     slow = verdict(noisy.run(late_in(0.08, 1.5e-3), record() | changed), TAIL)
     assert slow.status == "not_judged"
     assert slow.doubts[0].startswith(reason)
@@ -126,7 +128,7 @@ def test_an_unfit_machine_allows_no_verdict_on_what_is_over(changed: dict[str, s
     assert verdict(noisy.run(late_in(0.0, 0.0), record() | changed), TAIL).status == "within"
 
 
-def test_an_unsteady_machine_allows_no_verdict_on_late_ticks_but_one_on_messages() -> None:
+def test_on_an_unsteady_machine_messages_are_judged_and_late_ticks_are_not() -> None:
     unsteady = record(late=50.0)
     late = verdict(noisy.run(flags(100), unsteady), {"late": {"share": 0.01, "longest_gap": 2}})
     assert late.status == "not_judged"
@@ -134,7 +136,7 @@ def test_an_unsteady_machine_allows_no_verdict_on_late_ticks_but_one_on_messages
     assert verdict(noisy.run(late_in(0.08, 1.5e-3), unsteady), TAIL).status == "over"
 
 
-def test_a_message_that_waits_for_a_standstill_is_not_slow() -> None:
+def test_a_message_that_waits_for_a_paused_process_does_not_count_as_slow() -> None:
     found = late_in(0.03, 20e-3) | {"wake_lateness": np.full(10_000, 5e-5)}
     assert verdict(noisy.run(found, record()), TAIL).status == "over"
     found["wake_lateness"][:301] = 20e-3
@@ -170,13 +172,13 @@ def test_late_and_missed_ticks_are_counted() -> None:
     assert check(verdict(noisy.run(flags(31)), tables), "longest gap").verdict == "over"
 
 
-def test_a_stall_of_the_machine_is_no_gap_of_the_test() -> None:
+def test_a_pause_of_the_machine_does_not_count_as_a_gap_of_the_test() -> None:
     run = noisy.run(flags(40), record(max=0.021))
     stalled = check(verdict(run, {"late": {"longest_gap": 30}}), "longest gap")
     assert (stalled.bare, stalled.allowed, stalled.verdict) == (11, 41.0, "ok")
 
 
-def test_no_late_tick_at_all_can_be_asked_for() -> None:
+def test_a_budget_may_allow_no_late_tick() -> None:
     assert verdict(noisy.run(flags(1)), {"late": {"share": 0}}).status == "over"
     assert verdict(noisy.run(flags(0)), {"late": {"share": 0}}).status == "within"
 
@@ -198,7 +200,7 @@ def test_the_largest_value_alone_is_not_judged() -> None:
     assert verdict(run).status == "within"
 
 
-def test_what_is_absent_is_said_and_what_is_left_is_judged() -> None:
+def test_absent_figures_are_reported_and_the_others_judged() -> None:
     run = noisy.run(late_in(0.08, 1.5e-3))
     report = verdict(run)
     assert report.status == "over"
@@ -231,7 +233,7 @@ def two_slaves(ticks: int = 1166) -> Run:
     return noisy.ticked(run, ticks)
 
 
-def test_a_slave_without_a_row_is_over_any_budget_on_any_machine() -> None:
+def test_a_slave_without_any_row_is_over_any_budget() -> None:
     run = two_slaves()
     assert verdict(run).status == "within"
     noisy.keep(run, "latency.middle", slice(0, 0))
@@ -269,7 +271,7 @@ def test_ticks_without_a_row_count_as_late(rows: slice) -> None:
     )
 
 
-def test_the_gap_of_a_lost_tail_joins_that_of_its_last_late_ticks() -> None:
+def test_a_lost_end_extends_the_gap_of_the_last_late_ticks() -> None:
     run = noisy.ticked(noisy.run(flags(0, 100)), 100)
     run.columns["latency"]["deadline_missed"][78:80] = True
     report = verdict(noisy.keep(run, "latency", slice(80)), {"late": {"longest_gap": 21}})
@@ -277,7 +279,9 @@ def test_the_gap_of_a_lost_tail_joins_that_of_its_last_late_ticks() -> None:
 
 
 @pytest.mark.parametrize(("lost", "status"), [(0, "within"), (499, "within"), (500, "within"), (700, "over")])
-def test_of_a_recording_that_was_cut_off_the_last_second_may_lack_rows(lost: int, status: str) -> None:
+def test_in_a_recording_that_was_cut_off_rows_of_the_last_second_may_be_missing(
+    lost: int, status: str
+) -> None:
     run = noisy.keep(two_slaves(), "latency.middle", slice(1166 - lost))
     run.finished = False
     run.metadata.pop("summary")
@@ -315,7 +319,7 @@ def test_a_report_is_strict_json(run: Run) -> None:
     assert plain["status"] == ("within" if all(item["ok"] for item in plain["checks"]) else "over")
 
 
-def test_the_table_names_what_is_over_and_the_bare_loop() -> None:
+def test_the_table_names_the_figures_over_their_limits_and_the_bare_loop() -> None:
     said = text(verdict(noisy.delayed(1, 2500)))
     assert "over the budget: feedback_one_way p99" in said.splitlines()[-1]
     assert any(line.startswith("bare loop ") for line in said.splitlines())
@@ -323,14 +327,14 @@ def test_the_table_names_what_is_over_and_the_bare_loop() -> None:
 
 
 @given(st.floats(0.0, 5e-3), st.floats(0.0, 5e-3), st.sampled_from(["p50", "p90", "p99"]))
-def test_a_steady_delay_is_never_put_down_to_the_machine(value: float, limit: float, name: str) -> None:
+def test_a_steady_delay_is_never_attributed_to_the_machine(value: float, limit: float, name: str) -> None:
     run = noisy.run({"feedback_one_way": np.full(1000, value)}, record())
     report = verdict(run, {"feedback_one_way": {name: limit}})
     assert report.status == ("within" if value <= limit + min(2 * QUIET[name], 0.3e-3) + 1e-9 else "over")
 
 
 @given(st.integers(0, 40), st.floats(1e-4, 3e-3))
-def test_a_longer_tail_is_never_easier(late: int, value: float) -> None:
+def test_a_longer_tail_never_gives_a_better_verdict(late: int, value: float) -> None:
     order = ["within", "not_judged", "over"]
     shares = [late / 1000.0, (late + 1) / 1000.0]
     ranks = [order.index(verdict(noisy.run(late_in(share, value), NOISE), TAIL).status) for share in shares]

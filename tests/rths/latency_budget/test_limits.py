@@ -10,7 +10,7 @@ from common.errors import PlanError
 from report.budget.limits import DEFAULT, WAITS, from_tables, load
 
 
-def test_the_budget_that_ships_limits_both_directions_and_late_ticks() -> None:
+def test_the_shipped_budget_limits_both_directions_and_late_ticks() -> None:
     budget = load(None)
     assert budget.name == "default"
     assert {"command_one_way", "slave_time", "feedback_one_way", "round_trip"} <= budget.segments.keys()
@@ -62,7 +62,7 @@ def test_a_budget_limits_only_what_it_names(tmp_path: Path) -> None:
         ("[late", "is not valid TOML"),
     ],
 )
-def test_a_budget_that_cannot_be_is_refused_in_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+def test_an_impossible_budget_is_refused_in_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
     path = tmp_path / "b.toml"
     path.write_text(text)
     with pytest.raises(PlanError) as caught:
@@ -71,7 +71,7 @@ def test_a_budget_that_cannot_be_is_refused_in_a_sentence(tmp_path: Path, text: 
     assert str(caught.value).startswith(f"The budget {path}")
 
 
-def test_a_budget_that_cannot_be_read_is_refused_in_a_sentence(tmp_path: Path) -> None:
+def test_an_unreadable_budget_is_refused_in_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(PlanError, match="Cannot read the budget .*no.toml: No such file"):
         load(tmp_path / "no.toml")
     with pytest.raises(PlanError, match="Cannot read the budget .*: Is a directory"):
@@ -81,6 +81,6 @@ def test_a_budget_that_cannot_be_read_is_refused_in_a_sentence(tmp_path: Path) -
         load(tmp_path / "b.toml")
 
 
-def test_zero_is_a_limit() -> None:
+def test_a_limit_of_zero_is_accepted() -> None:
     tables: dict[str, Any] = {"late": {"share": 0, "longest_gap": 0}}
     assert from_tables(tables).late.share == 0.0

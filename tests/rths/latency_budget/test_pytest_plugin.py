@@ -32,7 +32,7 @@ def recording(path: Path, latency: float, stolen: str) -> None:
 
 
 def child(folder: Path, *words: str, case: str = CASE) -> tuple[int, str]:
-    """A run with the plug-in by hand and no installed one, which would be the same under another name."""
+    """A run with the plug-in loaded explicitly; an installed one, the same under another name, is left out."""
     return pytest_in(
         folder, "-p", "rths.pytest_plugin", *words, case=case, PYTEST_DISABLE_PLUGIN_AUTOLOAD="1"
     )
@@ -64,14 +64,14 @@ def installed(folder: Path) -> dict[str, str]:
     return {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)])}
 
 
-def test_within_passes(tmp_path: Path) -> None:
+def test_a_recording_within_its_budget_passes(tmp_path: Path) -> None:
     recording(tmp_path / "run.mcap", 1e-4, "0.0")
     code, out = child(tmp_path)
     assert code == 0, out
     assert "1 passed" in out
 
 
-def test_over_fails_with_the_table(tmp_path: Path) -> None:
+def test_a_recording_over_its_budget_fails_with_the_table(tmp_path: Path) -> None:
     recording(tmp_path / "run.mcap", 1.2e-3, "0.0")
     code, out = child(tmp_path)
     assert code == 1
@@ -81,7 +81,7 @@ def test_over_fails_with_the_table(tmp_path: Path) -> None:
     assert "Traceback" not in out
 
 
-def test_not_judged_skips_with_the_figures(tmp_path: Path) -> None:
+def test_a_recording_that_is_not_judged_skips_with_the_figures(tmp_path: Path) -> None:
     recording(tmp_path / "run.mcap", 1.2e-3, "0.2")
     code, out = child(tmp_path)
     assert code == 0, out
@@ -100,7 +100,7 @@ def test_a_budget_comes_from_the_option_or_from_the_call(tmp_path: Path, words: 
     assert code == 0, out
 
 
-def test_a_mistake_is_one_sentence(tmp_path: Path) -> None:
+def test_a_mistake_gives_one_sentence(tmp_path: Path) -> None:
     code, out = child(tmp_path)
     assert code == 1
     assert out.count("Cannot read the recording run.mcap: No such file or directory.") == 1
@@ -109,7 +109,7 @@ def test_a_mistake_is_one_sentence(tmp_path: Path) -> None:
     assert "During handling" not in out
 
 
-def test_where_rths_is_installed_the_fixture_is_there_by_itself(tmp_path: Path) -> None:
+def test_the_fixture_is_available_where_rths_is_installed(tmp_path: Path) -> None:
     variables = installed(tmp_path)
     recording(tmp_path / "run.mcap", 1e-4, "0.0")
     code, out = pytest_in(tmp_path, **variables)
@@ -126,7 +126,7 @@ def test_where_rths_is_installed_the_fixture_is_there_by_itself(tmp_path: Path) 
         (["-p", "no:rths", "-p", "rths.pytest_plugin"], {}),
     ],
 )
-def test_it_can_be_named_by_hand_where_it_is_installed(
+def test_the_plugin_can_be_named_explicitly_where_it_is_installed(
     tmp_path: Path, words: list[str], more: dict[str, str]
 ) -> None:
     variables = installed(tmp_path) | more

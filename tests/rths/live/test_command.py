@@ -26,7 +26,7 @@ from tests.processes import HANG_S
         (["run", "--virtual", "--live"], "--live shows a test in real time: leave out --virtual"),
     ],
 )
-def test_a_mistake_is_one_sentence(words: list[str], sentence: str, call: Any, capsys: Any) -> None:
+def test_a_mistake_gives_one_sentence(words: list[str], sentence: str, call: Any, capsys: Any) -> None:
     assert call(*words) == 2
     err = capsys.readouterr().err
     assert err.startswith(f"rths: {sentence}")

@@ -1,4 +1,4 @@
-"""What must hold of the axes of every figure, whatever page it stands in."""
+"""Checks of the axes of every figure on any page."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def check_axes(canvas: Any, name: str) -> None:
 
 
 def texts(canvas: Any) -> list[Any]:
-    """All text of a figure that is seen."""
+    """All visible text of a figure."""
     from matplotlib.text import Text
 
     found = [item for item in canvas.findobj(Text) if item.get_visible() and item.get_text()]

@@ -38,7 +38,7 @@ def made_up(storeys: int = 1, role: str = SLAVE, record: str = RECORD) -> Run:
 
 
 def sinusoid(frequency: float, amplitude: float, delay: float = 0.0, gain: float = 1.0) -> Run:
-    """Forty seconds of both transfer systems at one frequency (Hz) and amplitude (m), late by `delay` (s).
+    """Forty seconds of both transfer systems at one frequency (Hz) and amplitude (m), delayed by `delay` (s).
 
     The column's target belongs to its own tick, the table's is to be reached one tick later.
     """

@@ -1,4 +1,4 @@
-"""What the pictures show is what is in the recording."""
+"""The pictures show the contents of the recording."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def drawn(run: Run, name: str) -> Any:
 
 
 @pytest.mark.parametrize("storeys", [2, 3, 12])
-def test_floors_have_numbers_and_colours_of_their_own(storeys: int) -> None:
+def test_every_floor_has_its_own_number_and_colour(storeys: int) -> None:
     canvas = drawn(made_up(storeys), "histories")
     (axis,) = [axis for axis in canvas.axes if axis.get_ylabel().startswith("floor")]
     legend = axis.get_legend()
@@ -50,7 +50,7 @@ def test_one_storey_needs_no_legend() -> None:
 
 
 @pytest.mark.parametrize("name", ["tracking", "synchronisation", "spectra"])
-def test_legends_stand_above_the_curves(name: str) -> None:
+def test_legends_are_above_the_curves(name: str) -> None:
     canvas = drawn(made_up(), name)
     legends = [(axis, axis.get_legend()) for axis in canvas.axes if axis.get_legend()]
     assert legends
@@ -60,7 +60,7 @@ def test_legends_stand_above_the_curves(name: str) -> None:
         assert max(box.x1 for box in texts) <= canvas.bbox.x1
 
 
-def test_exact_following_is_no_error_whatever_tick_a_target_is_for() -> None:
+def test_exact_tracking_gives_no_error_whatever_tick_a_target_belongs_to() -> None:
     column, table = curves.pairs(sinusoid(2.0, 5e-3))
     assert np.max(np.abs(column.error)) == 0.0
     assert np.max(np.abs(table.error)) < 1e-15
@@ -69,7 +69,9 @@ def test_exact_following_is_no_error_whatever_tick_a_target_is_for() -> None:
 
 
 @pytest.mark.parametrize(("delay", "gain"), [(0.0, 1.1), (0.02, 1.0), (0.012, 0.93)])
-def test_synchronisation_tilts_by_the_amplitude_and_opens_by_the_delay(delay: float, gain: float) -> None:
+def test_the_synchronisation_plots_slope_shows_the_amplitude_and_its_area_the_delay(
+    delay: float, gain: float
+) -> None:
     run = sinusoid(2.0, 5e-3, delay, gain)
     phase = 2.0 * math.pi * 2.0 * delay
     for axis in drawn(run, "synchronisation").axes:
@@ -83,7 +85,7 @@ def test_synchronisation_tilts_by_the_amplitude_and_opens_by_the_delay(delay: fl
         assert abs(centre) <= 5.0 * gain * math.sin(phase) * 1.01 + 1e-9
 
 
-def test_what_the_synchronisation_says_is_what_inspect_says() -> None:
+def test_the_synchronisation_plot_and_inspect_give_the_same_figures() -> None:
     run = sinusoid(2.0, 5e-3, 0.018, 0.97)
     found: dict[str, Any] = tracking(run, laboratories(run))
     for axis, part in zip(drawn(run, "synchronisation").axes, ("actuator", "table"), strict=True):
@@ -106,7 +108,7 @@ def test_missing_ticks_do_not_shift_targets() -> None:
     assert np.max(np.abs(table.error)) < 1e-15
 
 
-def test_without_targets_a_command_stands_in_with_its_own_tick() -> None:
+def test_without_targets_the_command_is_shown_at_its_own_tick() -> None:
     run = sinusoid(2.0, 5e-3)
     master, slave = run.columns["master"], run.columns["slave"]
     del master["column_target"]
@@ -119,7 +121,7 @@ def test_without_targets_a_command_stands_in_with_its_own_tick() -> None:
 
 
 @pytest.mark.parametrize("frequency", [0.7, 2.0, 13.3])
-def test_a_spectrum_has_its_peak_and_its_mean_square_where_the_sinusoid_has(frequency: float) -> None:
+def test_a_spectrum_has_the_frequency_and_the_mean_square_of_the_sinusoid(frequency: float) -> None:
     run = sinusoid(frequency, 5e-3, 0.01)
     shown = {line.get_label(): line for line in drawn(run, "spectra").axes[0].lines}
     lines = {line.label: line for line in spectra.displacements(run)}
@@ -142,7 +144,7 @@ def test_a_spectrum_has_its_peak_and_its_mean_square_where_the_sinusoid_has(freq
         assert shown[label].get_xdata()[place] == pytest.approx(frequency, rel=0.06)  # half a band and a line
 
 
-def test_the_lines_of_a_band_are_averaged_and_keep_their_mean_square() -> None:
+def test_averaging_spectral_lines_over_a_band_keeps_their_mean_square() -> None:
     f = np.arange(0.1, 250.0, 0.1)
     density = np.abs(np.random.default_rng(1).normal(size=f.size))
     at, level = spectra.averaged(f, density)
@@ -166,7 +168,7 @@ def test_the_natural_frequency_is_that_of_the_plan(virtual_recording: Any) -> No
     assert spectra.natural_frequencies(run) == []  # nothing shook: a bench test
 
 
-def test_a_loop_absorbs_what_its_area_says() -> None:
+def test_the_absorbed_energy_is_the_area_of_the_loop() -> None:
     t = np.arange(20_000) * INTERVAL
     omega = 2.0 * math.pi * 0.5
     x, speed = 3e-3 * np.sin(omega * t), 3e-3 * omega * np.cos(omega * t)
@@ -175,7 +177,7 @@ def test_a_loop_absorbs_what_its_area_says() -> None:
     assert doubt < 1e-3 * energy
 
 
-def test_the_doubt_about_a_loop_is_what_noise_does_to_an_elastic_one() -> None:
+def test_the_uncertainty_of_a_loops_energy_is_that_of_an_elastic_loop_under_noise() -> None:
     draw, t = np.random.default_rng(3), np.arange(5_000) * INTERVAL
     x = 2e-3 * np.sin(4.0 * math.pi * t) * np.exp(-t / 3.0)
     found = [
@@ -189,7 +191,7 @@ def test_the_doubt_about_a_loop_is_what_noise_does_to_an_elastic_one() -> None:
     assert np.std(energies) == pytest.approx(0.5 * np.mean(doubts), rel=0.15)
 
 
-def test_the_parts_of_a_tick_are_rows_with_their_percentiles() -> None:
+def test_the_latency_segments_are_rows_with_their_percentiles() -> None:
     run = with_latency(made_up())
     upper, lower = drawn(run, "latency").axes
     assert [text.get_text().replace(" ", "_") for text in upper.get_yticklabels()] == list(SEGMENTS)
@@ -223,7 +225,7 @@ def huge(run: Run) -> None:
 
 @pytest.mark.parametrize("name", PICTURES)
 @pytest.mark.parametrize("spoil", [still, leaping, huge])
-def test_a_recording_of_nonsense_ends_no_command(spoil: Any, name: str) -> None:
+def test_a_recording_of_extreme_values_does_not_crash_a_command(spoil: Any, name: str) -> None:
     run = sinusoid(1.0, 1e-3)
     spoil(run)
     with np.errstate(all="ignore"), warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""Every picture at either width: named axes with units, letters that can be read, nothing cut, the same file twice."""
+"""Every picture at either width has named axes with units and readable letters, and is reproducible."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def width(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="module")
 def recording(virtual_recording: Path) -> Run:
-    """A whole test, with times that virtual ones have not."""
+    """A complete test with latencies, which virtual time lacks."""
     return with_latency(read(virtual_recording))
 
 
@@ -48,7 +48,7 @@ def canvases(recording: Run, width: str) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_every_axis_says_what_it_shows_and_in_which_unit(canvases: dict[str, Any]) -> None:
+def test_every_axis_has_a_label_with_its_unit(canvases: dict[str, Any]) -> None:
     for name, canvas in canvases.items():
         for axis in canvas.axes:
             below = axis.xaxis.get_tick_params()["labelbottom"]
@@ -59,7 +59,7 @@ def test_every_axis_says_what_it_shows_and_in_which_unit(canvases: dict[str, Any
                 assert label not in UNITS
 
 
-def test_no_letter_is_smaller_than_can_be_read_in_print(canvases: dict[str, Any], width: str) -> None:
+def test_every_letter_is_large_enough_to_be_read_in_print(canvases: dict[str, Any], width: str) -> None:
     inches = {"single": figure.SINGLE, "double": figure.DOUBLE}[width]
     for name, canvas in canvases.items():
         assert canvas.get_figwidth() == inches  # or the page would scale it
@@ -68,12 +68,12 @@ def test_no_letter_is_smaller_than_can_be_read_in_print(canvases: dict[str, Any]
             assert "$" not in text.get_text(), "mathematical text has smaller superscripts"
 
 
-def test_nothing_is_cut_off_and_no_factor_stands_above_an_axis(canvases: dict[str, Any]) -> None:
+def test_nothing_is_cut_off_and_no_axis_shows_a_factor(canvases: dict[str, Any]) -> None:
     for name, canvas in canvases.items():
         check_axes(canvas, name)
 
 
-def test_a_small_signal_has_no_factor_above_its_axis_either(recording: Run, width: str) -> None:
+def test_the_axis_of_a_small_signal_shows_no_factor(recording: Run, width: str) -> None:
     quiet = replace(recording, columns={topic: dict(of) for topic, of in recording.columns.items()})
     for of in quiet.columns.values():
         for name, values in of.items():
@@ -86,7 +86,7 @@ def test_a_small_signal_has_no_factor_above_its_axis_either(recording: Run, widt
         check_axes(canvas, name)
 
 
-def test_labels_of_one_axis_do_not_run_into_each_other(canvases: dict[str, Any]) -> None:
+def test_labels_of_one_axis_do_not_overlap(canvases: dict[str, Any]) -> None:
     for name, canvas in canvases.items():
         for axis in canvas.axes:
             unseen = {id(label) for label in hidden(axis)}
@@ -100,7 +100,7 @@ def test_labels_of_one_axis_do_not_run_into_each_other(canvases: dict[str, Any])
                 assert all(a[1] <= b[0] for a, b in pairwise(boxes)), f"{name}: {ends}"
 
 
-def test_lines_of_one_axis_differ_without_their_colour(canvases: dict[str, Any]) -> None:
+def test_lines_of_one_axis_differ_in_more_than_their_colour(canvases: dict[str, Any]) -> None:
     for name in ("tracking", "spectra", "latency"):
         for axis in canvases[name].axes:
             found = [line for line in axis.lines if not line.get_label().startswith("_")]
@@ -135,7 +135,7 @@ def test_a_saved_picture_is_as_wide_as_a_column(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", PICTURES)
-def test_a_recording_without_a_pictures_signals_has_none(name: str) -> None:
+def test_a_picture_is_left_out_if_its_signals_are_missing(name: str) -> None:
     run = made_up()
     for topic in run.columns:
         run.columns[topic] = {"t": run.columns[topic]["t"]}
@@ -146,7 +146,7 @@ def test_a_recording_without_a_pictures_signals_has_none(name: str) -> None:
 
 @pytest.mark.parametrize("name", PICTURES)
 @pytest.mark.parametrize("value", [np.nan, 0.0])
-def test_signals_that_say_nothing_do_no_harm(name: str, value: float) -> None:
+def test_signals_without_motion_do_not_break_a_picture(name: str, value: float) -> None:
     run = with_latency(made_up())
     for columns in run.columns.values():
         for signal in columns.keys() - {"t", "seq", "deadline_missed"}:
@@ -157,7 +157,7 @@ def test_signals_that_say_nothing_do_no_harm(name: str, value: float) -> None:
 
 @pytest.mark.parametrize("name", PICTURES)
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_a_test_that_ended_at_once_does_no_harm(name: str, count: int, tmp_path: Path) -> None:
+def test_a_test_that_ended_at_once_does_not_break_a_picture(name: str, count: int, tmp_path: Path) -> None:
     run = with_latency(made_up())
     for topic, columns in run.columns.items():
         run.columns[topic] = {signal: values[:count] for signal, values in columns.items()}
@@ -168,7 +168,7 @@ def test_a_test_that_ended_at_once_does_no_harm(name: str, count: int, tmp_path:
 
 
 @pytest.mark.parametrize("name", PICTURES)
-def test_single_readings_may_be_unknown(name: str, tmp_path: Path) -> None:
+def test_single_readings_may_be_nan(name: str, tmp_path: Path) -> None:
     run = with_latency(made_up())
     for columns in run.columns.values():
         for signal in columns.keys() - {"t", "seq", "deadline_missed"}:

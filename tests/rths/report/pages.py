@@ -1,4 +1,4 @@
-"""What must hold of every page: it stands alone, and a browser draws, folds and prints all of it."""
+"""Checks of every page: it loads nothing, and a browser draws, folds and prints all of it."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Balanced(HTMLParser):
 
 
 def check_alone(page: str) -> Balanced:
-    """Hold a page against what one needs that stands alone; what was found in it."""
+    """Check that a page loads nothing from elsewhere and is well formed; returns its parsed content."""
     found = Balanced(page)
     assert page.startswith("<!doctype html>\n<html lang=")
     assert [text for text in found.addresses if not text.startswith(("#", "data:image/png;base64,"))] == []
@@ -109,7 +109,7 @@ def check_in_browser(path: Path, folder: Path) -> None:
 
 
 def check_on_paper(address: str, folder: Path) -> None:
-    """Print: nothing is cut, and what is folded on a screen is there."""
+    """Check the printed page: nothing is cut off, and parts that are folded on a screen are printed."""
     from tests import browser
 
     width, height = PAPER

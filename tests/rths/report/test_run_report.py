@@ -1,4 +1,4 @@
-"""`rths report`: the figures of `rths inspect`, in a page that stands alone, whatever the recording holds."""
+"""`rths report` gives the figures of `rths inspect` in a page that loads nothing, for any recording."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_the_command_writes_a_page_beside_the_recording(
     assert str(tmp_path) not in made
 
 
-def test_the_page_has_the_figures_of_inspect(
+def test_the_report_page_has_the_figures_of_inspect(
     call: Any, capsys: Any, virtual_recording: Path, reported: Path
 ) -> None:
     assert call("inspect", virtual_recording, "--json") == 0
@@ -102,12 +102,12 @@ def test_the_page_shows_every_picture_with_its_text(reported: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_page_is_drawn_in_a_browser(reported: Path, tmp_path: Path) -> None:
+def test_the_report_page_is_drawn_in_a_browser(reported: Path, tmp_path: Path) -> None:
     check_in_browser(reported, tmp_path)
 
 
 @pytest.mark.slow
-def test_a_diagnosis_in_a_browser(tmp_path: Path) -> None:
+def test_a_diagnosis_page_is_drawn_in_a_browser(tmp_path: Path) -> None:
     path = tmp_path / "gap.html"
     path.write_text(diagnosis_page(read_report(fresh("explained"))), encoding="utf-8")
     check_in_browser(path, tmp_path)
@@ -131,7 +131,7 @@ def test_no_text_of_a_recording_becomes_markup(virtual_recording: Path, tmp_path
     assert "49" not in re.sub(r"\d[\d.,]*\d", "", found.text)
 
 
-def test_a_recording_that_was_cut_off_says_so_on_top(
+def test_the_page_of_a_recording_that_was_cut_off_states_this_first(
     call: Any, virtual_recording: Path, tmp_path: Path, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr(drawing, "PICTURES", {"tracking": PICTURES["tracking"]})
@@ -148,7 +148,7 @@ def test_a_recording_that_was_cut_off_says_so_on_top(
     assert "The recording does not say how the test ended." in text
 
 
-def test_a_damaged_recording_says_so_on_top(virtual_recording: Path, tmp_path: Path) -> None:
+def test_the_page_of_a_damaged_recording_states_this_first(virtual_recording: Path, tmp_path: Path) -> None:
     data = bytearray(virtual_recording.read_bytes())
     data[data.index(b"\x28\xb5\x2f\xfd", len(data) // 2) + 9] ^= 0xFF  # within a compressed chunk
     (tmp_path / "damaged.mcap").write_bytes(data)
@@ -159,7 +159,7 @@ def test_a_damaged_recording_says_so_on_top(virtual_recording: Path, tmp_path: P
     assert "rths recover damaged.mcap saves the intact data behind it" in text
 
 
-def test_imported_data_with_few_signals(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_imported_data_with_few_signals_give_a_page(call: Any, capsys: Any, tmp_path: Path) -> None:
     t = np.arange(500) * 2e-3
     rows = "\n".join(f"{at},{value}" for at, value in zip(t, 0.01 * np.sin(9.0 * t), strict=True))
     (tmp_path / "rig.csv").write_text(f"time,y\n{rows}\n")
@@ -179,7 +179,7 @@ def test_imported_data_with_few_signals(call: Any, capsys: Any, tmp_path: Path) 
     assert "rig.csv" in text
 
 
-def test_slaves_have_pictures_and_tables_of_their_own(tmp_path: Path, monkeypatch: Any) -> None:
+def test_every_slave_has_its_own_pictures_and_tables(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr(drawing, "PICTURES", {"tracking": PICTURES["tracking"]})
     slaves = {"roof": {}, "cellar": {"control": {"gain": 6e4}}}
     plan = from_tables({"test": {"duration": 2.0, "name": "two"}, "slave": slaves}, tmp_path)
@@ -193,7 +193,7 @@ def test_slaves_have_pictures_and_tables_of_their_own(tmp_path: Path, monkeypatc
     assert "Exchange with the slave 'roof', commands: 1000 sent" in text
 
 
-def test_margins_are_peaks_over_the_limits_of_the_plan(virtual_recording: Path) -> None:
+def test_margins_are_peaks_relative_to_the_limits_of_the_plan(virtual_recording: Path) -> None:
     run = read(virtual_recording)
     summary = summarize(run)
     found = {item.signal: item for item in verdict.margins(run, summary)}
@@ -205,7 +205,7 @@ def test_margins_are_peaks_over_the_limits_of_the_plan(virtual_recording: Path) 
     )
 
 
-def test_a_test_that_was_stopped_says_why(virtual_recording: Path) -> None:
+def test_the_page_of_a_stopped_test_states_the_cause(virtual_recording: Path) -> None:
     run = read(virtual_recording)
     run.metadata["summary"] |= {
         "outcome": "limit",
@@ -234,7 +234,7 @@ def test_a_test_that_was_stopped_says_why(virtual_recording: Path) -> None:
         (["{file}", "-o", "{file}", "--force"], "Cannot write {file}: the command reads it"),
     ],
 )
-def test_mistakes_get_one_sentence(
+def test_mistakes_give_one_sentence(
     words: list[str], sentence: str, call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "text.mcap").write_text("no recording")
@@ -247,7 +247,7 @@ def test_mistakes_get_one_sentence(
     assert virtual_recording.read_bytes() == before
 
 
-def test_a_file_that_must_not_be_read_or_written_is_said(
+def test_a_file_that_cannot_be_read_or_written_is_reported(
     call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path, monkeypatch: Any
 ) -> None:
     def refuse(*_words: Any, **_more: Any) -> Any:
@@ -274,5 +274,5 @@ def test_a_file_that_must_not_be_read_or_written_is_said(
         (["2026-11-21 06:46:21 UTC"], False),
     ],
 )
-def test_columns_of_numbers_are_told_from_texts(column: list[str], right: bool) -> None:
+def test_columns_of_numbers_are_distinguished_from_texts(column: list[str], right: bool) -> None:
     assert numeric(column) == right
