@@ -1,4 +1,4 @@
-"""The doctor: its judgement on findings made up, and a short check as a user calls it."""
+"""The doctor: its verdict on made-up findings, and a short check as a user calls it."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def judged(*change: tuple[str, Any]) -> tuple[verdict.CheckVerdict, list[str]]:
     return verdict.verdict(report, found), [check.name for check in found if not check.passed]
 
 
-def test_a_good_machine_holds() -> None:
+def test_a_good_machine_passes_every_check() -> None:
     found, failed = judged()
     assert (found.state, found.passed, failed) == ("holds", True, [])
     assert found.sentence == (
@@ -77,14 +77,16 @@ def test_a_good_machine_holds() -> None:
         (("machine/stolen_share", 0.03), "not judged", ["stolen time"]),
     ],
 )
-def test_each_check_can_fail_with_a_sentence(change: tuple[str, Any], state: str, failed: list[str]) -> None:
+def test_each_check_can_fail_with_one_sentence(
+    change: tuple[str, Any], state: str, failed: list[str]
+) -> None:
     found, names = judged(change)
     assert (found.state, names) == (state, failed)
     assert not found.passed
     assert found.sentence.count("\n") == 0
 
 
-def test_few_late_exchanges_or_no_priority_mostly_hold() -> None:
+def test_a_few_late_exchanges_or_a_missing_priority_pass_with_a_remark() -> None:
     late, _ = judged(("round_trip/late", 3))
     assert (late.state, late.passed) == ("mostly", True)
     assert "3 of 4000 exchanges were late" in late.sentence
@@ -93,7 +95,7 @@ def test_few_late_exchanges_or_no_priority_mostly_hold() -> None:
     assert "without a real-time priority" in ordinary.sentence
 
 
-def test_what_is_missing_is_a_note_unless_it_was_insisted_on() -> None:
+def test_a_missing_privilege_is_a_note_unless_the_mode_requires_it() -> None:
     missing = ("realtime/missing", ["No real-time priority: the limit RLIMIT_RTPRIO is 0; run as root."])
     assert judged(missing)[1] == []
     assert judged(missing, ("rt", "on"))[1] == ["real time"]
@@ -107,20 +109,20 @@ def test_what_is_missing_is_a_note_unless_it_was_insisted_on() -> None:
     assert verdict.notes(GOOD) == []
 
 
-def test_stolen_time_leaves_the_question_open() -> None:
+def test_stolen_time_leaves_the_verdict_open() -> None:
     found, _ = judged(("machine/stolen_share", 0.031), ("wake_up/fifo/late", 50))
     assert found.sentence.startswith("2 ms is not judged: the host took 3.1 % of the processors' time")
     assert "was not kept" in found.sentence
 
 
-def test_messages_are_filled_whatever_their_fields_are() -> None:
+def test_messages_have_zeros_in_all_fields_but_the_session() -> None:
     for message in (Command, Feedback):
         filled = exchange.filled(message, session=1)
         assert filled.session == 1
         assert not any(value for name, value in filled._asdict().items() if name != "session")
 
 
-def test_messages_of_the_exchange_can_be_sent() -> None:
+def test_the_doctors_exchange_messages_can_be_encoded() -> None:
     key = codec.session_key(1, exchange.TEST)
     for message in (exchange.COMMAND, exchange.FEEDBACK):
         assert codec.decode(codec.encode(message, key), key) == message
@@ -134,13 +136,13 @@ def test_a_slave_that_fails_ends_the_exchange_with_its_message(monkeypatch: pyte
     assert time.monotonic() - began < exchange.PATIENCE
 
 
-def test_percentiles_are_those_of_the_nearest_rank() -> None:
+def test_percentiles_follow_the_nearest_rank() -> None:
     assert exchange.percentiles([]) == {}
     found = exchange.percentiles(list(range(1000, 0, -1)))
     assert found == {"p50": 500e-9, "p90": 900e-9, "p99": 990e-9, "p99.9": 999e-9, "max": 1000e-9}
 
 
-def test_the_disk_is_measured_in_the_nearest_folder_and_nothing_stays(tmp_path: Path) -> None:
+def test_the_disk_is_measured_in_the_nearest_existing_folder_and_no_file_remains(tmp_path: Path) -> None:
     assert disk.nearest(tmp_path / "not" / "there") == tmp_path
     found = disk.measure(tmp_path, time.monotonic() + 0.2)
     assert found["syncs"] >= 1
@@ -156,7 +158,7 @@ def test_a_file_in_the_way_of_the_folder_is_refused(tmp_path: Path) -> None:
         disk.nearest(tmp_path / "file" / "runs")
 
 
-def test_a_folder_that_may_not_be_looked_into_is_judged_from_above(
+def test_an_unreadable_folder_is_judged_by_its_parent(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def exists(place: Path) -> bool:
@@ -168,7 +170,7 @@ def test_a_folder_that_may_not_be_looked_into_is_judged_from_above(
     assert disk.nearest(tmp_path / "secret" / "runs") == tmp_path
 
 
-def test_clocks_are_compared_with_themselves() -> None:
+def test_the_clock_check_gives_resolution_read_time_and_slew() -> None:
     watch = clock.ClockWatch()
     time.sleep(0.1)
     values = watch.values()
@@ -177,7 +179,9 @@ def test_clocks_are_compared_with_themselves() -> None:
     assert abs(values["slew"]) < 0.1
 
 
-def test_rivals_are_programs_with_a_priority(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_programs_with_a_real_time_priority_are_listed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(rivals, "PROC", tmp_path)
     for pid, words, priority in ((10, b"spin\0now\0", 80), (11, b"", 50), (12, b"calm\0", 0)):
         (tmp_path / str(pid)).mkdir()
@@ -196,7 +200,7 @@ def test_times_that_cannot_be_used_are_refused(option: tuple[str, str]) -> None:
 
 
 @pytest.mark.slow
-def test_a_short_check_has_all_parts_and_says_yes_or_no(tmp_path: Path) -> None:
+def test_a_short_check_has_all_parts_and_a_verdict(tmp_path: Path) -> None:
     words = [*RTHS, "--seconds", "4", "--json", "-o", str(tmp_path / "runs")]
     done = subprocess.run(words, capture_output=True, text=True, env=ENVIRONMENT, timeout=HANG_S)
     assert done.returncode in (0, 1), done.stderr
@@ -217,7 +221,7 @@ def children_of(pid: int) -> list[int]:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="children are found in /proc")
 @pytest.mark.parametrize(("number", "expected"), [(signal.SIGINT, 3), (signal.SIGKILL, -signal.SIGKILL)])
-def test_a_check_that_is_ended_leaves_no_child(number: int, expected: int) -> None:
+def test_an_interrupted_check_leaves_no_child_process(number: int, expected: int) -> None:
     doctor = subprocess.Popen([*RTHS, "--rt", "off"], stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
     assert doctor.stderr is not None
     assert doctor.stderr.readline().startswith("doctor: round trip")

@@ -57,15 +57,15 @@ STOPPED = (turn("master", 6, Mode.RUNNING, Mode.RAMPING), turn("slave", 6, Mode.
         (recorded({"master": 99}, cause=""), {"master": 10}),
     ],
 )
-def test_a_test_is_due_what_it_came_to(run: Run, expected: dict[str, int]) -> None:
+def test_only_ticks_up_to_the_end_of_a_test_are_expected(run: Run, expected: dict[str, int]) -> None:
     assert due(run, PLAN) == expected
 
 
-def test_without_a_plan_what_was_begun_was_due() -> None:
+def test_without_a_plan_the_recorded_ticks_are_expected() -> None:
     assert due(recorded({"master": 4, "slave": 5}), None) == {"master": 4, "slave": 5}
 
 
-def test_the_verdict_says_where_a_test_stopped_and_what_is_missing_until_then() -> None:
+def test_the_verdict_states_where_a_test_stopped_and_what_is_missing_until_then() -> None:
     facts = {"master": {"missing": 0}, "slave": {"missing": 204}}
     summary = {
         "ticks_planned": 7000,
@@ -78,7 +78,7 @@ def test_the_verdict_says_where_a_test_stopped_and_what_is_missing_until_then() 
     assert stopped(summary) == "stopped at tick 330 of 7000"
 
 
-def test_of_a_recording_that_was_cut_off_nobody_says_when_the_test_stopped() -> None:
+def test_for_a_recording_that_was_cut_off_the_verdict_does_not_state_the_end_of_the_test() -> None:
     facts = {"master": {"missing": 0}}
     summary = {"ticks_planned": 7000, "ticks_expected": 330, "topics": facts, "recorder": {}}
     assert stopped(summary) == "recorded until tick 330 of 7000; the rest of the test is not in the file"
@@ -87,7 +87,7 @@ def test_of_a_recording_that_was_cut_off_nobody_says_when_the_test_stopped() -> 
     )
 
 
-def test_a_run_that_a_limit_stops_counts_what_it_played(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_a_run_that_a_limit_stops_counts_the_ticks_until_then(call: Any, capsys: Any, tmp_path: Path) -> None:
     plan = tmp_path / "trip.toml"
     plan.write_text("[limits]\ncolumn_displacement = 1e-4\n[preflight]\npeak_share = 1e3\n")
     words = ["run", str(plan), "--virtual", "--duration", "4", "-o", str(tmp_path / "trip.mcap")]

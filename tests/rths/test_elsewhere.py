@@ -1,4 +1,4 @@
-"""Recordings in other programs: independent readers in Python and JavaScript, and the viewers' layout."""
+"""Recordings read by other programs: independent readers in Python and JavaScript, and the viewers' layout."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ KINDS = ("one slave", "two slaves", "extremes", "killed and recovered")
 
 
 class HeardMessage(NamedTuple):
-    """A message as an independent reader has it; doubles as hex digits of their bits."""
+    """A message as an independent reader gives it; doubles are hex digits of their bits."""
 
     sequence: int
     log_ns: int
@@ -49,7 +49,7 @@ class HeardMessage(NamedTuple):
 
 
 class Read(NamedTuple):
-    """A recording as an independent reader has it."""
+    """A recording as an independent reader gives it."""
 
     messages: dict[str, list[HeardMessage]]
     metadata: dict[str, dict[str, str]]
@@ -206,7 +206,7 @@ def cell(kind: FieldType, value: Any) -> Any:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_independent_reader_in_python_has_every_field_of_every_message(
+def test_an_independent_reader_in_python_reads_every_field_of_every_message(
     kind: str, recordings: dict[str, Path]
 ) -> None:
     ours, theirs = read(recordings[kind]), by_python(recordings[kind])
@@ -222,13 +222,13 @@ def test_the_independent_reader_in_python_has_every_field_of_every_message(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_independent_reader_in_javascript_has_every_field_of_every_message(
+def test_an_independent_reader_in_javascript_reads_every_field_of_every_message(
     kind: str, recordings: dict[str, Path], javascript: Any
 ) -> None:
     assert by_javascript(javascript, recordings[kind]) == by_python(recordings[kind])
 
 
-def test_the_recordings_have_what_the_comparison_is_about(recordings: dict[str, Path]) -> None:
+def test_the_compared_recordings_contain_every_case(recordings: dict[str, Path]) -> None:
     for kind, path in recordings.items():
         found = by_python(path)
         assert "killed" in kind or found.messages.keys() == {
@@ -305,7 +305,7 @@ def test_a_layout_has_the_form_that_the_viewers_read(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["one slave", "two slaves", "extremes"])
-def test_every_path_of_a_layout_finds_something_in_the_recording(
+def test_every_path_of_a_layout_exists_in_the_recording(
     kind: str, recordings: dict[str, Path], javascript: Any, tmp_path: Path
 ) -> None:
     out = tmp_path / "layout.json"
@@ -350,7 +350,7 @@ def test_the_script_in_the_layout_counts_the_histogram(drawn: Path, javascript: 
         assert np.allclose(made["time"], np.repeat(np.arange(201), 2)[1:-1] * 2e-5, rtol=1e-12)
 
 
-def test_the_layout_without_a_recording_is_that_of_the_default_test(
+def test_the_layout_without_a_recording_equals_that_of_the_default_test(
     call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
 ) -> None:
     assert call("layout", "-o", tmp_path / "layout.json", "--json") == 0
@@ -359,7 +359,7 @@ def test_the_layout_without_a_recording_is_that_of_the_default_test(
     assert made["configById"] == layout.layout(layout.of_recording(virtual_recording))["configById"]
 
 
-def test_a_layout_has_no_panel_of_what_is_not_recorded(drawn: Path) -> None:
+def test_a_layout_has_no_panel_for_signals_that_are_not_recorded(drawn: Path) -> None:
     panels = layout.layout(layout.of_recording(drawn))["configById"]
     assert set(panels) == {
         "Plot!histogram",
@@ -369,7 +369,7 @@ def test_a_layout_has_no_panel_of_what_is_not_recorded(drawn: Path) -> None:
     }
 
 
-def test_what_a_layout_cannot_be_made_of_is_said_in_one_sentence(
+def test_a_file_without_a_layout_is_refused_in_one_sentence(
     call: Any, capsys: Any, recordings: dict[str, Path], tmp_path: Path
 ) -> None:
     bare = Recording(tmp_path / "bare.mcap", "bare", 1, {"master": (signals.SEQ, signals.TIME)})

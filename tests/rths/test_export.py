@@ -1,4 +1,4 @@
-"""What `rths export` writes, read back by other programs' libraries."""
+"""The files of `rths export`, read by other programs' libraries."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_another_library_reads_every_column_to_the_last_bit(
 
 
 def as_in(suffix: str, column: Any) -> Any:
-    """A column in the types that a format has: MAT no booleans, CSV no widths of whole numbers."""
+    """A column in the types of a format: MAT has no booleans, CSV no widths of integers."""
     if column.dtype.kind == "b" and suffix == ".mat":
         return column.astype(np.uint8)
     return column.astype(np.int64) if column.dtype.kind == "i" and suffix == ".csv" else column
@@ -72,7 +72,7 @@ def same_bits(got: Any, wanted: Any, name: str) -> None:
     assert got.tobytes() == wanted.tobytes(), name
 
 
-def test_columns_are_the_recordings_own_and_what_is_missing_is_nan(recording: Path) -> None:
+def test_columns_equal_those_of_the_recording_with_nan_for_missing_values(recording: Path) -> None:
     found, columns = read(recording), export.flat(read(recording))
     assert all(column.shape == (extremes.TICKS,) for column in columns.values())
     assert np.isnan(columns["slave_cellar_damper_force"][-1])
@@ -85,7 +85,9 @@ def test_columns_are_the_recordings_own_and_what_is_missing_is_nan(recording: Pa
                 assert exported[: part.size].tobytes() == part.tobytes()
 
 
-def test_units_go_with_the_columns(call: Any, capsys: Any, recording: Path, tmp_path: Path) -> None:
+def test_columns_are_exported_with_their_units(
+    call: Any, capsys: Any, recording: Path, tmp_path: Path
+) -> None:
     assert call("export", recording, "-o", tmp_path / "a.parquet", "--json") == 0
     said = json.loads(capsys.readouterr().out)["units"]
     assert said == wanted_units(read(recording))
@@ -128,7 +130,7 @@ def rows_of_mat(path: Path) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("suffix", READERS)
-def test_events_come_back(
+def test_exported_events_are_read_back(
     suffix: str, call: Any, recording: Path, virtual_recording: Path, tmp_path: Path
 ) -> None:
     rows: dict[str, Callable[[Path], list[dict[str, Any]]]] = {
@@ -143,13 +145,17 @@ def test_events_come_back(
         assert returned == read(source).events
 
 
-def test_without_the_option_there_is_one_file(call: Any, recording: Path, tmp_path: Path) -> None:
+def test_without_the_option_for_events_one_file_is_written(
+    call: Any, recording: Path, tmp_path: Path
+) -> None:
     assert call("export", recording, "-o", tmp_path / "a.csv") == 0
     assert call("export", recording, "-o", tmp_path / "b.mat", "--events") == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "b.mat"]
 
 
-def test_a_name_too_long_for_matlab_is_said_in_one_sentence(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_a_name_that_is_too_long_for_matlab_is_refused_in_one_sentence(
+    call: Any, capsys: Any, tmp_path: Path
+) -> None:
     slave = "slave." + "a" * 60
     topics = signals.default_topics((slave,))
     written = Recording(tmp_path / "long.mcap", "long", 1, {slave: topics[slave]}, (slave,))
@@ -162,7 +168,7 @@ def test_a_name_too_long_for_matlab_is_said_in_one_sentence(call: Any, capsys: A
     assert call("export", tmp_path / "long.mcap", "-o", tmp_path / "a.csv") == 0
 
 
-def test_a_recording_without_ticks_is_said_in_one_sentence(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_a_recording_without_ticks_is_refused_in_one_sentence(call: Any, capsys: Any, tmp_path: Path) -> None:
     written = Recording(tmp_path / "none.mcap", "none", 1, {"event": signals.EVENT})
     written.add("event", 0, 0, [0.0, "master", "error", "refused", "no", {}])
     written.close({})

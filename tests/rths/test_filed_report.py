@@ -1,4 +1,4 @@
-"""A report that can be filed: laboratory, operator, calibration of sensors, PDF."""
+"""A report for the files of a laboratory: its name, the operator, the calibration of sensors, PDF."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SAID = {
 
 @pytest.fixture(scope="module")
 def recording(short_plan: Plan, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A short test whose plan says what its report shall say."""
+    """A short test whose plan gives the texts of its report."""
     tables = short_plan.written()
     tables["test"]["duration"] = 0.5
     plan = from_tables(tables | {"report": SAID}, Path())
@@ -36,7 +36,7 @@ def recording(short_plan: Plan, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return path
 
 
-def test_the_page_says_it_and_the_browser_prints_it(
+def test_the_report_shows_laboratory_operator_and_calibration_and_is_printed_to_pdf(
     call: Any, capsys: Any, recording: Path, tmp_path: Path
 ) -> None:
     if browser.chromium() is None:
@@ -61,7 +61,7 @@ def test_check_names_the_calibration_that_is_overdue(call: Any, capsys: Any, tmp
     )
 
 
-def test_a_pdf_needs_a_browser_and_a_file_of_its_own(
+def test_a_pdf_needs_a_browser_and_a_separate_file(
     call: Any, capsys: Any, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert call("report", recording, "-o", tmp_path / "a.html", "--pdf", tmp_path / "a.html") == 2

@@ -1,4 +1,4 @@
-"""FMUs both ways: a laboratory in FMPy, an FMU as a rig and as a specimen in the loop, and what is refused."""
+"""FMUs in both directions: a laboratory in FMPy, an FMU as a rig or a specimen in the loop, and refused ones."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def commands(count: int, width: int) -> Any:
 
 
 def by_rig(role: str, tables: dict[str, Any], rows: Any) -> list[tuple[float, ...]]:
-    """What the rig itself reads: before the first command, and after each."""
+    """The readings of the rig itself: before the first command, and after each."""
     plan = parse(TEXT, ROOT)
     reality = (from_reality(tables, plan, ROOT) if tables else as_planned(plan)).of(role)
     rig, kind = rigs.build(reality, role), rigs.hosted(reality, role)
@@ -124,7 +124,7 @@ def test_a_laboratory_as_an_fmu_passes_the_checker_and_gives_the_rigs_bits(
 
 @with_fmpy
 @compiled
-def test_another_seed_is_another_noise(laboratories: dict[str, Path]) -> None:
+def test_an_fmu_with_another_seed_has_different_noise(laboratories: dict[str, Path]) -> None:
     found = []
     for seed in (1, 1, 2):
         fmu = Fmu(str(laboratories["master"]), 0.002, (), (), {"seed": seed})
@@ -193,7 +193,7 @@ def test_a_loop_with_a_specimen_in_an_fmu_gives_the_bits_of_the_emulated_column(
 
 @with_fmpy
 @compiled
-def test_an_fmu_that_fails_ends_the_test_and_a_step_beside_the_interval_is_refused(elastic: Path) -> None:
+def test_an_fmu_that_fails_ends_the_test_and_a_step_other_than_the_interval_is_refused(elastic: Path) -> None:
     rig = Specimen(0.002, 1, str(elastic), actuator={"delay": 0.0, "gain": 1e6})
     rig.arm()
     rig.write(ColumnCommand(0.0))
@@ -211,7 +211,7 @@ def test_an_fmu_that_fails_ends_the_test_and_a_step_beside_the_interval_is_refus
 
 @with_fmpy
 @compiled
-def test_what_cannot_be_an_fmu_or_lacks_a_variable_is_said(elastic: Path, tmp_path: Path) -> None:
+def test_an_invalid_fmu_or_one_that_lacks_a_variable_is_refused(elastic: Path, tmp_path: Path) -> None:
     (tmp_path / "no.fmu").write_text("no archive")
     with zipfile.ZipFile(tmp_path / "empty.fmu", "w") as archive:
         archive.writestr("readme", "")
@@ -229,7 +229,7 @@ def test_what_cannot_be_an_fmu_or_lacks_a_variable_is_said(elastic: Path, tmp_pa
 
 @with_fmpy
 @compiled
-def test_an_fmu_for_another_machine_is_said(elastic: Path, tmp_path: Path) -> None:
+def test_an_fmu_for_another_platform_is_refused(elastic: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(elastic) as archive, zipfile.ZipFile(tmp_path / "other.fmu", "w") as other:
         other.writestr("modelDescription.xml", archive.read("modelDescription.xml"))
     rig = Specimen(0.002, 1, str(tmp_path / "other.fmu"))
@@ -238,13 +238,13 @@ def test_an_fmu_for_another_machine_is_said(elastic: Path, tmp_path: Path) -> No
     rig.disarm()
 
 
-def test_without_fmpy_the_sentence_has_the_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_fmpy_the_message_states_the_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "fmpy", None)
     with pytest.raises(InputError, match=r"because fmpy is not installed: `make fmi` installs FMPy\."):
         Rig(0.002, 1, str(tmp_path / "a.fmu"))
 
 
-def test_an_export_that_cannot_be_is_refused(
+def test_an_impossible_fmu_export_is_refused(
     call: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "a.fmu"
@@ -255,6 +255,6 @@ def test_an_export_that_cannot_be_is_refused(
     assert not out.exists()
 
 
-def test_channels_have_units_in_a_model_description() -> None:
+def test_channels_have_their_units_in_a_model_description() -> None:
     units = {row.unit for row in (COLUMN_CHANNELS.command, *COLUMN_CHANNELS.measured)}
     assert units <= build.EXPONENTS.keys()

@@ -1,4 +1,4 @@
-"""`rths fragility`: curves of a table with a known chance, and what cannot be read said in one sentence."""
+"""`rths fragility`: curves of a table with known probabilities, and refusals in one sentence."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pyarrow import parquet
 
 @pytest.fixture
 def table(tmp_path: Path) -> Path:
-    """A sweep whose peak passes 20 mm with the chance of a lognormal curve of median 0.8 m/s² and dispersion 0.4."""
+    """A sweep whose peak exceeds 20 mm with the probability of a lognormal curve (median 0.8 m/s², dispersion 0.4)."""
     random = np.random.default_rng(1)
     pga = np.repeat(np.linspace(0.2, 2.0, 10), 200)
     peak = 0.02 * pga / 0.8 * np.exp(0.4 * random.standard_normal(pga.size))
@@ -27,7 +27,7 @@ def table(tmp_path: Path) -> Path:
     return path
 
 
-def test_the_curve_is_that_of_the_tests(
+def test_the_fragility_curve_agrees_with_the_known_one(
     call: Callable[..., int], table: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ("fragility", table, "--quantity", "peak_drift", "--limit", "20 mm", "--by", "compensator")
@@ -44,7 +44,7 @@ def test_the_curve_is_that_of_the_tests(
     assert "m/s² (" in out
 
 
-def test_a_limit_that_no_test_passes_has_no_curve(
+def test_a_limit_that_no_test_exceeds_has_no_curve(
     call: Callable[..., int], table: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert call("fragility", table, "--quantity", "peak_drift", "--limit", "9 m") == 1
@@ -60,7 +60,7 @@ def test_a_limit_that_no_test_passes_has_no_curve(
         (("--quantity", "peak_drift", "--limit", "20 kg"), "--limit"),
     ],
 )
-def test_what_cannot_be_asked_is_one_sentence(
+def test_impossible_arguments_of_fragility_are_refused_in_one_sentence(
     call: Callable[..., int],
     table: Path,
     capsys: pytest.CaptureFixture[str],
@@ -73,7 +73,7 @@ def test_what_cannot_be_asked_is_one_sentence(
     assert error.count("\n") == 1
 
 
-def test_a_table_that_is_none_is_said(
+def test_a_file_that_is_not_a_sweep_table_is_refused(
     call: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ("--quantity", "peak_drift", "--limit", "1")

@@ -1,4 +1,4 @@
-"""A drive without a spring, imported: friction and a constant force found although its replay from rest would drift.
+"""An imported drive without a spring: friction and a constant force are found although its replay would drift.
 
 In such a drive friction with a constant force is the same as friction that is larger in one direction. The pair has
 fewer free parameters than that law of friction, so it is named, and the report says that the law explains as much.
@@ -21,7 +21,7 @@ INTERVAL, SUBSTEPS, SECONDS, PERIOD = 0.002, 20, 12.0, 5.0
 
 
 def wanted(t: float) -> float:
-    """Point to point and back, 0.1 m, with rests between."""
+    """A motion of 0.1 m between two points, with pauses."""
     place = (t % PERIOD) / PERIOD
     share = min(max((place if place < 0.5 else place - 0.5) / 0.4, 0.0), 1.0)
     smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
@@ -49,7 +49,7 @@ def drive() -> tuple[Array, Array]:
 
 
 @pytest.mark.slow
-def test_friction_of_a_drive_without_a_spring(tmp_path: Path) -> None:
+def test_the_friction_of_a_drive_without_a_spring_is_found(tmp_path: Path) -> None:
     import argparse
 
     force, position = drive()

@@ -1,4 +1,4 @@
-"""Text from elsewhere reaches the terminal as letters: no escape sequence, no forged line, in no command."""
+"""Text from files and other processes reaches the terminal as plain letters, in every command."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ HOSTILE = (
 @pytest.mark.parametrize(
     "text", [READABLE, "Ω \u00a0 × 10³ m/s² – „Müller“ 中文 שלום عربي 👩\u200d🔬", "plain\ttext\n"]
 )
-def test_what_people_write_stays_readable(text: str) -> None:
+def test_ordinary_text_stays_readable(text: str) -> None:
     assert ANYWHERE.sub("", text) == text
     assert shown(text.strip()).replace("\\t", "\t") == text.strip()
 
 
-def test_what_acts_on_a_terminal_is_written_out() -> None:
+def test_characters_that_act_on_a_terminal_are_escaped() -> None:
     assert shown("\x1b[2K\r\n\x9b\u202e\udc80") == r"\x1b[2K\r\n\x9b\u202e\udc80"
     assert all_shown({"\x07": ["\n", 1, {"a": "\x1b"}]}) == {r"\x07": [r"\n", 1, {"a": r"\x1b"}]}
     assert shown(HOSTILE).isprintable()
     assert READABLE in shown(HOSTILE)
 
 
-def test_whatever_a_command_prints_is_escaped(capsys: Any) -> None:
+def test_everything_that_a_command_prints_is_escaped(capsys: Any) -> None:
     with escaping():
         print("\x1b[31m", end="\n")  # as a rig may do
         print("\x9b", file=sys.stderr)
@@ -56,7 +56,7 @@ def test_whatever_a_command_prints_is_escaped(capsys: Any) -> None:
     assert (said.out, said.err) == ("\\x1b[31m\n\\u202e\n", "\\x9b\n")
 
 
-def test_what_processes_say_stays_one_line() -> None:
+def test_a_message_of_a_process_stays_on_one_line() -> None:
     stream = io.StringIO()
     progress = RunProgress(1.0, stream)
     for data in (
@@ -69,7 +69,7 @@ def test_what_processes_say_stays_one_line() -> None:
     assert stream.getvalue().count("\n") == 2
 
 
-def test_a_board_keeps_its_own_sequences_and_shows_those_of_others(monkeypatch: Any) -> None:
+def test_the_terminal_display_keeps_its_own_sequences_and_escapes_those_in_texts(monkeypatch: Any) -> None:
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     stream = io.StringIO()
@@ -83,7 +83,7 @@ def test_a_board_keeps_its_own_sequences_and_shows_those_of_others(monkeypatch: 
     assert r"a\x1b]8" in drawn
 
 
-def test_a_link_and_tables_and_progress_are_escaped(capsys: Any, monkeypatch: Any) -> None:
+def test_links_tables_and_progress_are_escaped(capsys: Any, monkeypatch: Any) -> None:
     monkeypatch.setattr("report.text.progress.UNSAID", 0.0)
     with escaping():
         cli.text_report("event", {"lab": HOSTILE, "text": HOSTILE})
@@ -98,7 +98,7 @@ def test_a_link_and_tables_and_progress_are_escaped(capsys: Any, monkeypatch: An
 
 
 def harmless(said: str) -> None:
-    """Nothing in it acts on a terminal, and no line of it is forged."""
+    """Asserts that nothing in a text acts on a terminal and that no line of it is forged."""
     assert not ANYWHERE.search(said), said
     assert not any(line.startswith("FORGED") for line in said.split("\n")), said
 
@@ -164,7 +164,7 @@ SHOWN_BY = (
 SILENT = ("live",)  # which prints the address of its page alone
 
 
-def test_every_command_that_reads_a_recording_is_tried() -> None:
+def test_every_command_that_reads_a_recording_is_tested() -> None:
     from rths.__main__ import parser_for
 
     reading = {verb for verb in VERBS if any(item.dest == "file" for item in parser_for(verb)._actions)}
@@ -172,7 +172,7 @@ def test_every_command_that_reads_a_recording_is_tried() -> None:
 
 
 @pytest.mark.parametrize("verb", PRINTING)
-def test_a_command_prints_the_text_of_a_recording_as_letters(
+def test_a_command_prints_the_text_of_a_recording_escaped(
     verb: str, call: Any, capsys: Any, hostile: Path, tmp_path: Path, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr(drawing, "PICTURES", {})
@@ -188,7 +188,7 @@ def test_a_command_prints_the_text_of_a_recording_as_letters(
 
 
 def identified(*_: Any) -> dict[str, Any]:
-    """The same of a part."""
+    """The identified parameters of a part, with hostile texts."""
     parameters = {HOSTILE: {"value": 1.0, "low": 0.5, "high": 2.0, "unit": HOSTILE}}
     return {"part": HOSTILE, "parameters": parameters, "model": HOSTILE}
 
@@ -209,7 +209,9 @@ def said_of(*_: Any, **__: Any) -> dict[str, Report]:
 
 
 @pytest.mark.parametrize("verb", ["inspect", "replay", "budget", "diagnose"])
-def test_an_error_sentence_quotes_no_sequence(verb: str, call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_an_error_message_contains_no_escape_sequence(
+    verb: str, call: Any, capsys: Any, tmp_path: Path
+) -> None:
     path = tmp_path / "a.mcap"
     with path.open("wb") as sink:
         writer = Writer(sink)
@@ -225,7 +227,7 @@ def test_an_error_sentence_quotes_no_sequence(verb: str, call: Any, capsys: Any,
     assert READABLE in said
 
 
-def test_the_characters_are_those_that_act() -> None:
+def test_the_escaped_characters_are_those_that_act_on_a_terminal() -> None:
     """The range is written with the characters themselves, so that it is compared with what Unicode says of them."""
     import unicodedata
 

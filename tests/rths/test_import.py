@@ -1,4 +1,4 @@
-"""The import map: units, what the logger did, the part of the file that is read, how it is written, slips."""
+"""The import map: units, properties of the logger, the part of the file, its format, and mistaken units or signs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def table(
 
 
 def known(run: Run) -> ImportedData:
-    """What a recording states of its import."""
+    """The statements of a recording about its import."""
     found = imported(run)
     assert found is not None
     return found
@@ -59,7 +59,7 @@ DRIVE = (
 )
 
 
-def test_units_stand_for_scales_and_what_the_logger_did_is_kept(bring: Any) -> None:
+def test_units_give_the_scales_and_the_loggers_properties_are_kept(bring: Any) -> None:
     rows = DRIVE + (
         'column_force = { column = "f", unit = "kN", delay = "2 ms", resolution = "0.1 kN", calibration = 0.01, '
         'filter = { type = "butterworth", order = 4, cutoff = 100.0 } }\n'
@@ -87,7 +87,9 @@ def test_rows_between_the_ticks_are_marked(bring: Any, capsys: Any) -> None:
     )
 
 
-def test_semicolons_decimal_commas_a_preamble_and_a_row_of_units(bring: Any, capsys: Any) -> None:
+def test_files_with_semicolons_decimal_commas_a_preamble_and_a_row_of_units_are_read(
+    bring: Any, capsys: Any
+) -> None:
     text = table(
         "t;u;y", TIMES, COMMAND, LATE, between=";", decimal=",", below="s;mm;mm", above="Logger Müller"
     )
@@ -117,7 +119,9 @@ def test_static_data_keep_their_rows_and_need_no_time(bring: Any) -> None:
     assert not known(run).channel("master", "column_displacement").interpolated
 
 
-def test_numbers_of_messages_are_held_and_stamps_belong_together(bring: Any, capsys: Any) -> None:
+def test_sequence_numbers_are_held_between_rows_and_incomplete_time_stamps_are_left_out(
+    bring: Any, capsys: Any
+) -> None:
     numbers = np.floor(TIMES / 0.02)
     rows = (
         DRIVE
@@ -152,7 +156,7 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("case", SLIPS.values(), ids=SLIPS)
-def test_a_slip_of_unit_or_sign_stops_in_one_sentence(bring: Any, capsys: Any, case: Any) -> None:
+def test_a_mistaken_unit_or_sign_is_refused_in_one_sentence(bring: Any, capsys: Any, case: Any) -> None:
     position, force, message = case
     text = table("t,u,y,f", TIMES, COMMAND, position, force)
     rows = DRIVE + 'column_force = { column = "f", unit = "kN" }\n'
@@ -163,7 +167,9 @@ def test_a_slip_of_unit_or_sign_stops_in_one_sentence(bring: Any, capsys: Any, c
     assert bring(text, rows, 'time = "t"\n', "--as-is")[0] == 0
 
 
-def test_a_column_without_a_command_is_held_against_its_deformation(bring: Any, capsys: Any) -> None:
+def test_a_force_without_a_command_is_checked_against_the_measured_deformation(
+    bring: Any, capsys: Any
+) -> None:
     rows = 'column_displacement = { column = "y" }\ncolumn_force = { column = "f", unit = "kN" }\n'
     assert bring(table("t,y,f", TIMES, LATE, FORCE), rows)[0] == 2
     assert (
@@ -195,7 +201,9 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG.values(), ids=WRONG)
-def test_what_does_not_fit_is_one_sentence(bring: Any, capsys: Any, case: Any) -> None:
+def test_an_import_map_that_does_not_fit_is_refused_in_one_sentence(
+    bring: Any, capsys: Any, case: Any
+) -> None:
     rows, top, message = case
     text = table("t,u", TIMES, COMMAND)
     assert bring(text, rows.replace("x =", "actuator_command =") + "\n", f'time = "t"\n{top}')[0] == 2
@@ -204,7 +212,7 @@ def test_what_does_not_fit_is_one_sentence(bring: Any, capsys: Any, case: Any) -
     assert error.count("\n") == 1
 
 
-def test_the_report_as_json_says_what_was_done(bring: Any, capsys: Any) -> None:
+def test_the_json_report_states_how_the_data_were_imported(bring: Any, capsys: Any) -> None:
     assert bring(table("t,u,y", 1.05 * TIMES, COMMAND, LATE), DRIVE, 'time = "t"\n', "--json")[0] == 0
     found = json.loads(capsys.readouterr().out)
     assert found["interpolated"] == ["actuator_command", "column_displacement"]

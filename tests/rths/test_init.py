@@ -17,7 +17,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def test_the_plan_is_the_default_test_by_another_name(call: Any, tmp_path: Path) -> None:
+def test_the_plan_of_init_is_the_default_test_under_another_name(call: Any, tmp_path: Path) -> None:
     assert call("init", "my_test") == 0
     made, default = plans.load(tmp_path / "my_test.toml"), plans.load(cli.plan_path("default"))
     mine, theirs = made.tables(), default.tables()
@@ -39,7 +39,7 @@ def test_a_rig_whose_methods_are_not_written_refuses_to_arm(call: Any, capsys: A
     assert "arm() of ColumnRig is not written yet" in capsys.readouterr().err
 
 
-def test_nothing_is_replaced_and_nothing_half_written(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_init_replaces_no_file_and_leaves_no_partial_one(call: Any, capsys: Any, tmp_path: Path) -> None:
     (tmp_path / "mine_rig.py").write_text("my work\n")
     assert call("init", "mine") == 2
     assert "mine_rig.py exists and is not replaced" in capsys.readouterr().err
@@ -56,6 +56,6 @@ def test_a_name_that_no_test_can_have_is_refused(call: Any, capsys: Any) -> None
     )
 
 
-def test_the_version_is_that_of_the_package(call: Any, capsys: Any) -> None:
+def test_the_printed_version_is_that_of_the_package(call: Any, capsys: Any) -> None:
     assert call("--version") == 0
     assert capsys.readouterr().out == f"rths {importlib.metadata.version('rths')}\n"

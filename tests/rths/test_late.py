@@ -1,4 +1,4 @@
-"""The sentences on a recording's late ticks, in its summary and its verdict."""
+"""The sentences about a recording's late ticks, in its summary and its verdict."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def with_late(path: Path, *spans: tuple[int, int]) -> Run:
     )
 
 
-def test_a_run_that_lost_real_time_says_so_first(virtual_recording: Path, capsys: Any) -> None:
+def test_a_run_that_missed_real_time_states_this_first(virtual_recording: Path, capsys: Any) -> None:
     run = with_late(virtual_recording, (0, 1800))
     summary = summarize(run)
     assert summary["real_time"] == {"late": 1800, "ticks": 2000, "worst": 1000, "window": 1000}
@@ -54,7 +54,7 @@ def test_single_pauses_are_counted_without_a_warning(
     assert summary["warnings"] == []
 
 
-def test_on_a_virtual_clock_no_message_that_an_effect_delays_is_a_late_tick(virtual_recording: Path) -> None:
+def test_in_virtual_time_delayed_messages_do_not_count_as_late_ticks(virtual_recording: Path) -> None:
     run = read(virtual_recording)
     run.columns["latency"]["deadline_missed"] = np.ones(len(run.columns["latency"]["seq"]), dtype=bool)
     summary = summarize(run)
@@ -62,7 +62,7 @@ def test_on_a_virtual_clock_no_message_that_an_effect_delays_is_a_late_tick(virt
     assert summary["warnings"] == []
 
 
-def test_where_no_latency_is_recorded_nothing_is_said(virtual_recording: Path) -> None:
+def test_without_recorded_latency_late_ticks_are_not_mentioned(virtual_recording: Path) -> None:
     run = read(virtual_recording)
     columns = {topic: values for topic, values in run.columns.items() if topic != "latency"}
     assert late.late_ticks(replace(run, columns=columns)) is None

@@ -1,4 +1,4 @@
-"""Manners of the command line: one sentence for a mistake, one JSON document for a report, quiet ends, exit codes."""
+"""Conventions of the command line: one sentence for a mistake, one JSON document for a report, exit codes."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, virtual_recording: Pat
 
 @pytest.fixture
 def litter(tmp_path: Path, virtual_recording: Path) -> None:
-    """Files and folders that nobody should give to a command."""
+    """Files and folders that are wrong arguments for any command."""
     (tmp_path / "folder").mkdir()
     for name in ("file", "empty.mcap", "empty.csv"):
         (tmp_path / name).touch()
@@ -177,13 +177,15 @@ def test_a_mistake_gives_one_sentence_and_exit_code_2(line: str, call: Call, cap
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_a_wrong_option_is_one_sentence_that_says_where_help_is(verb: str, call: Call, capsys: Any) -> None:
+def test_a_wrong_option_gives_one_sentence_that_points_to_the_help(
+    verb: str, call: Call, capsys: Any
+) -> None:
     assert call(f"{EXAMPLES[verb].partition(' >')[0].removeprefix('rths ')} --nonsense") == 2
     assert capsys.readouterr().err == f"rths: unrecognized arguments: --nonsense; see rths {verb} --help.\n"
 
 
 @pytest.mark.parametrize("verb", [verb for verb in VERBS if verb not in SILENT])
-def test_every_verb_that_reports_takes_json(verb: str) -> None:
+def test_every_command_that_reports_accepts_json(verb: str) -> None:
     assert "--json" in parser_for(verb).format_help()
 
 
@@ -196,7 +198,7 @@ def test_json_is_one_document_and_nothing_else_on_standard_output(verb: str, cal
     assert "\x1b" not in said.out + said.err
 
 
-def test_only_the_running_test_in_a_terminal_has_colours() -> None:
+def test_colours_are_used_only_in_the_terminal_display_of_a_running_test() -> None:
     drawn = {
         ROOT / "rths" / "board.py",
         ROOT / "rths" / "terminal.py",
@@ -206,7 +208,7 @@ def test_only_the_running_test_in_a_terminal_has_colours() -> None:
             assert not re.search(r"\\x1b|\\033|\\e\[|\x1b", path.read_text(encoding="utf-8")), path
 
 
-def test_exit_codes_stand_in_one_table() -> None:
+def test_every_exit_code_is_in_one_table() -> None:
     classes = [one for one in vars(errors).values() if isinstance(one, type) and issubclass(one, RthsError)]
     assert {one.exit_code for one in classes} <= set(EXIT_CODES)
     page = " ".join((ROOT / "docs/reference/commands.md").read_text(encoding="utf-8").split())
@@ -225,7 +227,7 @@ def started(*words: str | Path) -> subprocess.Popen[str]:
 
 
 @pytest.mark.parametrize("words", [["inspect", "{recording}"], ["--help"], ["inspect", "--help"]])
-def test_a_reader_that_has_gone_is_no_error(words: list[str], virtual_recording: Path) -> None:
+def test_a_closed_pipe_on_standard_output_is_not_an_error(words: list[str], virtual_recording: Path) -> None:
     with started(*(word.replace("{recording}", str(virtual_recording)) for word in words)) as process:
         assert process.stdout
         assert process.stderr
@@ -237,7 +239,7 @@ def test_a_reader_that_has_gone_is_no_error(words: list[str], virtual_recording:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("line", ["faults --schedules 400", "faults --jobs 2 --schedules 400"])
-def test_ctrl_c_is_one_sentence_and_exit_code_3(line: str) -> None:
+def test_ctrl_c_gives_one_sentence_and_exit_code_3(line: str) -> None:
     with started(*line.split()) as process:
         assert process.stderr
         begun = process.stderr.readline()  # of progress, after two seconds
@@ -249,7 +251,7 @@ def test_ctrl_c_is_one_sentence_and_exit_code_3(line: str) -> None:
     assert process.returncode == 3
 
 
-def test_ctrl_c_within_code_that_is_made_as_it_goes_keeps_its_exit_code(tmp_path: Path) -> None:
+def test_ctrl_c_within_generated_code_gives_exit_code_3(tmp_path: Path) -> None:
     text = "import os, signal, time; os.kill(os.getpid(), signal.SIGINT); time.sleep(60)"
     program = (
         f"import sys; from common.terminal.cli import guarded; sys.exit(guarded(lambda: exec({text!r})))"
@@ -266,7 +268,7 @@ def test_a_file_that_is_not_there_leaves_no_folder_behind(call: Call, tmp_path: 
 
 
 @pytest.mark.parametrize("line", ["plot .", "export . -o . --events", "recover .", f"live {'x' * 300}"])
-def test_a_path_that_is_none_is_one_sentence(
+def test_an_impossible_path_gives_one_sentence(
     line: str, call: Call, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert call(line) == 2
@@ -278,7 +280,9 @@ def test_a_path_that_is_none_is_one_sentence(
 @pytest.mark.parametrize(
     ("line", "code"), [("compare {recording} nosuch.mcap", 2), ("inspect {recording}", 0)]
 )
-def test_an_exit_code_stays_where_nobody_reads(line: str, code: int, virtual_recording: Path) -> None:
+def test_an_exit_code_is_kept_when_standard_output_is_closed(
+    line: str, code: int, virtual_recording: Path
+) -> None:
     words = line.replace("{recording}", str(virtual_recording)).split()
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     with subprocess.Popen(

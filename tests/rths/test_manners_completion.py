@@ -155,14 +155,14 @@ def test_fish_completes_verbs_options_choices_plans_and_files(folder: Path) -> N
     assert done.stderr == ""
 
 
-def test_another_shtab_is_refused_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_version_of_shtab_is_refused_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shtab.complete", lambda *_: "compdef _rths rths")
     with pytest.raises(InputError, match=r"install the one in requirements\.lock"):
         script("zsh")
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_every_verb_and_option_is_in_every_script(shell: str) -> None:
+def test_every_command_and_option_is_in_every_completion_script(shell: str) -> None:
     text = script(shell)
     for verb in VERBS:
         assert verb in text
@@ -171,7 +171,7 @@ def test_every_verb_and_option_is_in_every_script(shell: str) -> None:
                 assert option.lstrip("-") in text, (verb, option)
 
 
-def test_a_script_is_written_without_the_packages_that_take_long_to_load() -> None:
+def test_a_completion_script_is_written_without_loading_slow_packages() -> None:
     program = (
         "import sys; from rths.__main__ import main; sys.argv = ['rths', 'completion', 'bash']; assert main() == 0; "
         f"sys.stderr.write(' '.join(name for name in {SLOW} if name in sys.modules))"

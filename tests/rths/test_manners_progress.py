@@ -11,7 +11,7 @@ from report.text.progress import Progress
 
 @pytest.fixture(autouse=True)
 def unhurried() -> None:
-    """Here progress is what is tested."""
+    """These tests need progress, which is switched off elsewhere."""
 
 
 class Terminal(io.StringIO):
@@ -19,7 +19,7 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_nothing_is_said_of_what_ends_within_two_seconds() -> None:
+def test_work_that_ends_within_two_seconds_shows_no_progress() -> None:
     stream = io.StringIO()
     progress = Progress("working", stream, began=0.0)
     for now in (0.0, 1.0, 1.99):
@@ -27,7 +27,7 @@ def test_nothing_is_said_of_what_ends_within_two_seconds() -> None:
     assert stream.getvalue() == ""
 
 
-def test_elsewhere_a_line_at_most_every_five_seconds_and_only_of_what_moved() -> None:
+def test_without_a_terminal_progress_is_a_line_every_five_seconds_and_only_after_a_change() -> None:
     stream = io.StringIO()
     progress = Progress("working", stream, began=0.0)
     for now in range(40):
@@ -64,7 +64,7 @@ def test_on_a_terminal_one_line_is_rewritten_within_its_width_and_wiped(
     assert lines[-2:] == [" " * 17, ""]
 
 
-def test_an_error_leaves_the_line_and_begins_a_new_one() -> None:
+def test_an_error_keeps_the_progress_line_and_starts_a_new_one() -> None:
     stream = Terminal()
 
     def work() -> None:

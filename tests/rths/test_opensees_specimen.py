@@ -1,4 +1,4 @@
-"""Specimens of OpenSees under the emulated actuator: bits, materials, a model of a user's, and what goes wrong."""
+"""Specimens of OpenSees under the emulated actuator: equal bits, materials, a user's model, and failures."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_the_loop_with_steel02_is_near_the_loop_with_this_programs_own_law(tmp_p
 
 
 @with_opensees
-def test_the_rig_gives_what_opensees_says_along_its_own_way() -> None:
+def test_the_rigs_force_equals_that_of_opensees_along_the_same_path() -> None:
     rows = [["Steel02", 1, 25e3, 12.5e6, 0.05, 18.0, 0.925, 0.15]]
     silent = {"column_displacement": 0.0, "column_force": 0.0}
     rig = Specimen(0.002, 3, materials=rows, sensors=silent, substeps=3)
@@ -90,7 +90,7 @@ def test_the_rig_gives_what_opensees_says_along_its_own_way() -> None:
 
 @with_opensees
 @pytest.mark.parametrize(("name", "bars", "slip"), [("8-D22", 8, False), ("4-D22_bondslip", 4, True)])
-def test_the_curves_that_ship_are_those_of_the_model(name: str, bars: int, slip: bool) -> None:
+def test_the_shipped_curves_are_those_of_the_model(name: str, bars: int, slip: bool) -> None:
     rows = np.loadtxt(CURVES / f"column_{name}.csv", delimiter=",", skiprows=1)[:120]
     options = {"bars": bars, "slip": slip}
     column = SpecimenProcess("the column", {"model": str(EXAMPLES / "fiber_column.py"), "options": options})
@@ -103,7 +103,7 @@ def test_the_curves_that_ship_are_those_of_the_model(name: str, bars: int, slip:
 
 
 @with_opensees
-def test_a_model_without_equilibrium_ends_the_test_with_a_sentence(tmp_path: Path) -> None:
+def test_a_model_without_equilibrium_ends_the_test_with_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "rod.py").write_text(
         "def build(ops):\n"
         "    ops.model('basic', '-ndm', 1, '-ndf', 1)\n"
@@ -125,7 +125,7 @@ def test_a_model_without_equilibrium_ends_the_test_with_a_sentence(tmp_path: Pat
 
 
 @with_opensees
-def test_an_opensees_that_dies_ends_the_test_with_a_sentence() -> None:
+def test_a_dead_opensees_process_ends_the_test_with_one_sentence() -> None:
     rig = Specimen(0.002, 3, **ELASTIC)
     os.kill(rig._process._program._process.pid, signal.SIGKILL)
     with pytest.raises(RigError, match="OpenSees has ended as the specimen 'Elastic'"):
@@ -141,12 +141,12 @@ def test_an_opensees_that_dies_ends_the_test_with_a_sentence() -> None:
         ({"file": str(EXAMPLES / "steel02.toml")}, "OpenSees cannot be the specimen"),
     ],
 )
-def test_what_opensees_does_not_take_is_said(options: dict[str, Any], text: str) -> None:
+def test_a_material_that_opensees_refuses_is_reported(options: dict[str, Any], text: str) -> None:
     with pytest.raises(InputError, match=text):
         Specimen(0.002, 1, **options)
 
 
-def test_an_interpreter_without_openseespy_is_said_in_a_sentence_with_the_remedy(
+def test_an_interpreter_without_openseespy_gives_one_sentence_with_the_remedy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     python = tmp_path / "python"

@@ -47,7 +47,7 @@ UNREPLACED = {
 
 
 @pytest.mark.parametrize("name", WRITES)
-def test_an_existing_file_stays(
+def test_an_existing_file_is_not_replaced(
     name: str, call: Any, capsys: Any, tmp_path: Path, virtual_recording: Path
 ) -> None:
     verb, (words, option) = re.split("[, ]", name)[0], WRITES[name]
@@ -66,7 +66,7 @@ def test_an_existing_file_stays(
     assert sorted(tmp_path.iterdir()) == [plan, output]
 
 
-def test_every_command_that_writes_has_the_option() -> None:
+def test_every_command_that_writes_has_the_option_force() -> None:
     writing = set()
     for verb in VERBS:
         parser = parser_for(verb)
@@ -78,7 +78,7 @@ def test_every_command_that_writes_has_the_option() -> None:
     assert writing == {re.split("[, ]", name)[0] for name in WRITES} | {"doctor"}
 
 
-def test_a_command_that_fails_leaves_nothing(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_a_command_that_fails_leaves_no_file(call: Any, capsys: Any, tmp_path: Path) -> None:
     useless = tmp_path / "useless.mcap"
     useless.write_text("no recording")
     for words in (

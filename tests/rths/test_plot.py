@@ -50,7 +50,7 @@ def test_the_caption_stays_inside_the_picture_and_off_the_axes(record: str, role
     assert all(axis.get_tightbbox().y1 <= box.y0 for axis in canvas.axes)
 
 
-def test_without_a_motion_the_caption_is_the_test_alone() -> None:
+def test_without_a_ground_motion_the_caption_names_only_the_test() -> None:
     run = made_up()
     run.metadata = {}
     assert plot.caption(run, SLAVE) == "test"
@@ -75,7 +75,7 @@ def test_one_picture_goes_into_a_file_of_its_format(
     assert next(path.parent.iterdir()).read_bytes().startswith(head)
 
 
-def test_what_is_left_out_is_said_in_json_only(
+def test_pictures_that_are_left_out_are_named_in_json_only(
     call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
 ) -> None:
     assert call(virtual_recording, "-o", tmp_path, "--json") == 0
@@ -106,7 +106,7 @@ WRONG: dict[str, tuple[list[str], str]] = {
 
 
 @pytest.mark.parametrize("words_and_message", WRONG.values(), ids=WRONG.keys())
-def test_a_wrong_word_is_one_sentence(
+def test_a_wrong_picture_name_gives_one_sentence(
     words_and_message: tuple[list[str], str], call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
@@ -117,14 +117,14 @@ def test_a_wrong_word_is_one_sentence(
     assert error.count("\n") == 1
 
 
-def test_help_says_what_to_look_for_in_each_picture(call: Any, capsys: Any) -> None:
+def test_the_help_states_what_to_look_for_in_each_picture(call: Any, capsys: Any) -> None:
     assert call("--help") == 0
     shown = " ".join(capsys.readouterr().out.split())
     for name, picture in PICTURES.items():
         assert f"{name} {picture.text}" in shown
 
 
-def test_measurements_of_others_are_drawn_as_far_as_they_go(call: Any, tmp_path: Path) -> None:
+def test_imported_measurements_are_drawn_as_far_as_they_go(call: Any, tmp_path: Path) -> None:
     examples = ROOT / "examples" / "real_data"
     data, cut = examples / "force_rig.csv", tmp_path / "map.toml"
     text = (examples / "force_rig_map.toml").read_text().replace('plan = "', f'plan = "{examples}/')

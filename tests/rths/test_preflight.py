@@ -37,7 +37,7 @@ def noted(run: Run, code: str) -> list[tuple[str, str, str]]:
     ],
 )
 @pytest.mark.parametrize("verb", ["run --virtual", "run", "master"])
-def test_a_risk_refuses_before_anything_starts(
+def test_a_risk_refuses_the_test_before_any_process_starts(
     verb: str, text: str, name: str, sentence: str, call: Any, capsys: Any, tmp_path: Path, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr("common.link.zenoh_link.ZenohLink", None)  # no link may open
@@ -54,7 +54,7 @@ def test_a_risk_refuses_before_anything_starts(
     assert not (tmp_path / "a.mcap").exists()
 
 
-def test_what_is_passed_is_a_line_each_and_recorded(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_each_passed_check_is_one_line_and_recorded(call: Any, capsys: Any, tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     assert call("run", "--virtual", "--duration", "1", "-o", path, "--json") == 0
     lines = capsys.readouterr().err.splitlines()
@@ -71,7 +71,7 @@ def test_what_is_passed_is_a_line_each_and_recorded(call: Any, capsys: Any, tmp_
     assert noted(run, "accepted_risk") == []
 
 
-def test_a_risk_taken_by_name_is_in_the_recording(call: Any, capsys: Any, tmp_path: Path) -> None:
+def test_an_accepted_risk_is_recorded(call: Any, capsys: Any, tmp_path: Path) -> None:
     (tmp_path / "p.toml").write_text(UNSTABLE)
     path = tmp_path / "a.mcap"
     assert call("run", "--virtual", tmp_path / "p.toml", "-o", path, "--accept-risk", "partition") == 0
@@ -82,7 +82,7 @@ def test_a_risk_taken_by_name_is_in_the_recording(call: Any, capsys: Any, tmp_pa
 
 
 @pytest.mark.parametrize("verb", ["run", "master", "slave", "record"])
-def test_a_risk_that_is_none_is_one_sentence(verb: str, call: Any, capsys: Any) -> None:
+def test_an_unknown_risk_gives_one_sentence(verb: str, call: Any, capsys: Any) -> None:
     assert call(verb, "default", "--accept-risk", "sensor") == 2
     assert capsys.readouterr().err == "rths: There is no risk 'sensor' to accept: did you mean sensors?\n"
 
@@ -90,7 +90,7 @@ def test_a_risk_that_is_none_is_one_sentence(verb: str, call: Any, capsys: Any) 
 @pytest.mark.parametrize(
     ("signal", "lab", "bias"), [("column_force", "A", 60e3), ("table_acceleration", "B", 4.0)]
 )
-def test_a_sensor_off_zero_refuses_as_its_laboratory_arms(
+def test_a_sensor_with_an_offset_refuses_the_test_when_its_laboratory_arms(
     signal: str, lab: str, bias: float, call: Any, capsys: Any, tmp_path: Path
 ) -> None:
     path, real = tmp_path / "a.mcap", tmp_path / "real.toml"
@@ -109,7 +109,7 @@ def test_a_sensor_off_zero_refuses_as_its_laboratory_arms(
     assert f"risk 'sensors' accepted: {signal} of laboratory {lab} is off zero" in text
 
 
-def test_judging_the_sensors_changes_no_bit_of_a_test(short_plan: Plan, tmp_path: Path) -> None:
+def test_the_sensor_check_changes_no_bit_of_a_test(short_plan: Plan, tmp_path: Path) -> None:
     plan = with_test(short_plan, duration=1.0)
     runs = []
     for name, gate in (("with", Gate()), ("without", None)):
@@ -121,7 +121,7 @@ def test_judging_the_sensors_changes_no_bit_of_a_test(short_plan: Plan, tmp_path
             assert np.array_equal(values, runs[1].columns[topic][name]), name
 
 
-def test_the_users_own_laboratory_is_not_disturbed_unless_it_says_so(
+def test_a_users_rig_is_not_read_at_rest_unless_it_allows_that(
     call: Any, capsys: Any, tmp_path: Path
 ) -> None:
     plan = (ROOT / "examples" / "my_test.toml").read_text()
@@ -162,7 +162,7 @@ def test_accepted_risks_are_handed_to_every_process(tmp_path: Path) -> None:
         assert given[place : place + 4] == words, name
 
 
-def test_the_unstable_experiment_of_the_paper_is_run_by_name_alone(default_plan: Plan) -> None:
+def test_the_papers_unstable_experiment_runs_only_with_its_risks_accepted(default_plan: Plan) -> None:
     plan = experiments.without_amd(experiments.compensated_by(default_plan, CompensatorTable("none", {})))
     gate = experiments.gate_of(experiments.UNSTABLE, plan)
     assert [risk.name for risk in gate.overruled] == ["partition", "peaks"]

@@ -1,4 +1,4 @@
-"""Measurements of others, imported and diagnosed as `docs/explanation/real_data.md` describes."""
+"""Published measurements, imported and diagnosed as `docs/explanation/real_data.md` describes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]
 
 
 @pytest.mark.slow
-def test_the_force_rig_is_found_slower_than_planned_by_what_cross_correlation_says(
+def test_the_force_rigs_extra_delay_agrees_with_the_cross_correlation(
     rig: tuple[Path, dict[str, Any]],
 ) -> None:
     path, report = rig
@@ -62,7 +62,7 @@ def test_the_force_rig_is_found_slower_than_planned_by_what_cross_correlation_sa
     assert lag + interval == pytest.approx(seen, abs=3e-3)  # a command is reached one interval later
 
 
-def test_what_is_left_of_the_force_rigs_gap_is_said(rig: tuple[Path, dict[str, Any]]) -> None:
+def test_the_unexplained_part_of_the_force_rigs_gap_is_reported(rig: tuple[Path, dict[str, Any]]) -> None:
     _, report = rig
     far = report["how_far"]
     assert report["status"] in ("partly_explained", "unknown_effect")
@@ -78,7 +78,9 @@ def test_what_is_left_of_the_force_rigs_gap_is_said(rig: tuple[Path, dict[str, A
         *(pytest.param(name, marks=pytest.mark.slow) for name in ("4-D22", "8-D22", "4-D22_bondslip")),
     ],
 )
-def test_a_fibre_column_yields_and_softens_with_the_drift_it_has_seen(name: str, tmp_path: Path) -> None:
+def test_a_fibre_column_is_found_to_yield_and_to_soften_with_its_largest_drift(
+    name: str, tmp_path: Path
+) -> None:
     report = diagnose_file(imported(COLUMNS / f"column_{name}.csv", f"column_{name}", tmp_path)).plain()
     first = report["which"][0]
     assert first["effects"] == ["column.yielding"]

@@ -29,9 +29,7 @@ def device(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_kind_of_ones_own_is_computed_again_where_its_class_is(
-    call: Any, capsys: Any, device: Path
-) -> None:
+def test_a_users_kind_is_replayed_where_its_class_is_available(call: Any, capsys: Any, device: Path) -> None:
     assert call("replay", device) == 2
     assert "There is no file" in capsys.readouterr().err
     assert call("replay", device, "--plan", DEVICE, "--json") == 0
@@ -48,7 +46,7 @@ def test_a_kind_of_ones_own_is_computed_again_where_its_class_is(
         ("slave", "piston_command", "slave/piston_command"),
     ],
 )
-def test_one_bit_of_it_is_found(topic: str, name: str, differs: str, device: Path) -> None:
+def test_one_changed_bit_of_a_users_kind_is_found(topic: str, name: str, differs: str, device: Path) -> None:
     found = read(device)
     values = found.columns[topic][name]
     values[200] = np.nextafter(values[200], np.inf)
@@ -57,12 +55,12 @@ def test_one_bit_of_it_is_found(topic: str, name: str, differs: str, device: Pat
     assert matches[differs].differing
 
 
-def test_a_master_alone_held_still_where_its_command_is_the_one_before() -> None:
+def test_without_slaves_a_tick_counts_as_held_if_its_command_equals_the_previous_one() -> None:
     alone = Run(Path("a.mcap"), roles=())
     assert replay.held_ticks(alone, [0.1, 0.2, 0.2, 0.3]) == {2}
 
 
-def test_ticks_held_before_any_command_to_several_slaves(tmp_path: Path) -> None:
+def test_ticks_held_before_the_first_command_to_several_slaves_are_replayed(tmp_path: Path) -> None:
     plan = with_test(load(plan_path("two_dampers")), duration=0.1)
     assert virtual.run(virtual.assemble(plan, as_planned(plan), tmp_path / "a.mcap"), str) is None
     found = read(tmp_path / "a.mcap")

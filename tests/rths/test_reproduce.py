@@ -1,4 +1,4 @@
-"""The seed paper reproduced: every row within its tolerance, every picture there, and rows that can fail."""
+"""The seed paper reproduced: every row is within its tolerance and can fail, and every picture is drawn."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_every_row_is_within_its_tolerance(evidence: PaperEvidence) -> None:
 
 
 @pytest.mark.slow
-def test_a_row_fails_where_its_number_is_wrong(evidence: PaperEvidence) -> None:
+def test_a_row_fails_if_its_number_is_wrong(evidence: PaperEvidence) -> None:
     wrong = copy.copy(evidence)
     wrong.damping = evidence.damping | {"paper": 0.05, "ideal": 0.045, "beyond": 0.05}
     wrong.critical_delay = (0.034, 0.0341)
@@ -46,7 +46,7 @@ def test_a_row_fails_where_its_number_is_wrong(evidence: PaperEvidence) -> None:
 
 
 @pytest.mark.slow
-def test_the_command_ends_with_1_where_a_row_fails(
+def test_the_command_ends_with_exit_code_1_if_a_row_fails(
     evidence: PaperEvidence, tmp_path: Path, monkeypatch: Any, call: Any, capsys: Any
 ) -> None:
     wrong = copy.copy(evidence)
@@ -59,7 +59,7 @@ def test_the_command_ends_with_1_where_a_row_fails(
 
 
 @pytest.mark.slow
-def test_the_command_leaves_recordings_pictures_and_one_page(tmp_path: Path, call: Any, capsys: Any) -> None:
+def test_the_command_writes_recordings_pictures_and_one_page(tmp_path: Path, call: Any, capsys: Any) -> None:
     assert call("reproduce", "-o", tmp_path, "--json") == 0
     report = json.loads(capsys.readouterr().out)
     assert all(row["passed"] for row in report["rows"])
@@ -75,7 +75,9 @@ def test_the_command_leaves_recordings_pictures_and_one_page(tmp_path: Path, cal
 
 
 @pytest.mark.slow
-def test_the_page_stands_alone_and_in_a_browser(evidence: PaperEvidence, tmp_path: Path) -> None:
+def test_the_page_of_the_reproduction_loads_nothing_and_is_drawn_in_a_browser(
+    evidence: PaperEvidence, tmp_path: Path
+) -> None:
     table, drawn = rows(evidence), draw_all(FIGURES, evidence, tmp_path)
     table[0] = replace(table[0], name="<b>period</b>", note="<script>")
     text = page(table, drawn)
@@ -85,7 +87,7 @@ def test_the_page_stands_alone_and_in_a_browser(evidence: PaperEvidence, tmp_pat
     check_in_browser(tmp_path / "index.html", tmp_path)
 
 
-def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path, call: Any, capsys: Any) -> None:
+def test_a_folder_that_cannot_be_written_is_reported(tmp_path: Path, call: Any, capsys: Any) -> None:
     (tmp_path / "file").touch()
     assert call("reproduce", "-o", tmp_path / "file" / "x") == 2
     assert "give another folder with -o" in capsys.readouterr().err

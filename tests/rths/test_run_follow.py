@@ -1,4 +1,4 @@
-"""How `rths run` understands its processes, and when it stops them."""
+"""How `rths run` reads the reports of its processes, and when it stops them."""
 
 from __future__ import annotations
 
@@ -48,17 +48,17 @@ EVENT = {"kind": "event", "lab": "slave", "level": "error", "code": "lost", "tex
         "\N{REPLACEMENT CHARACTER}\x00",
     ],
 )
-def test_what_is_no_report_is_a_line_of_text(line: str) -> None:
+def test_a_line_that_is_not_a_report_is_taken_as_text(line: str) -> None:
     assert understood(line + "\n") == [{"kind": "text", "text": line}]
 
 
-def test_a_report_is_understood_behind_what_a_rig_has_printed_without_an_end_of_line() -> None:
+def test_a_report_is_read_after_output_of_a_rig_without_a_line_end() -> None:
     assert understood(json.dumps(EVENT) + "\n") == [EVENT]
     assert understood("...." + json.dumps(EVENT) + "\n") == [{"kind": "text", "text": "...."}, EVENT]
 
 
 class Times:
-    """When an ending asks and kills, looked at every tenth of a second for a minute."""
+    """The times at which an ending asks and kills processes, polled every tenth of a second for a minute."""
 
     def __init__(self, ending: Ending, ends: dict[str, float], wish: float = 1e9) -> None:
         self.asked: dict[str, float] = {}
@@ -84,7 +84,7 @@ def near(value: float) -> Any:
     return pytest.approx(value, abs=0.15)
 
 
-def test_a_wish_before_the_start_reaches_all_laboratories_at_once_and_then_the_recorder(
+def test_a_stop_before_the_start_is_sent_to_all_laboratories_at_once_and_then_to_the_recorder(
     short_plan: Plan,
 ) -> None:
     times = Times(ending(short_plan, agreed=False), {"master": 2.0, "slave": 3.0}, wish=1.0)
@@ -96,13 +96,15 @@ def test_a_wish_before_the_start_reaches_all_laboratories_at_once_and_then_the_r
     assert times.killed == {"recorder": near(3.0 + MARGIN_S + KILL_S)}
 
 
-def test_a_failure_before_the_start_reaches_the_others_after_a_moment(short_plan: Plan) -> None:
+def test_a_failure_before_the_start_stops_the_others_after_a_moment(short_plan: Plan) -> None:
     times = Times(ending(short_plan, agreed=False), {"recorder": 1.0, "slave": 3.0, "master": 3.0})
     assert times.asked == {"master": near(1.0 + MARGIN_S), "slave": near(1.0 + MARGIN_S)}
     assert not times.killed
 
 
-def test_a_wish_during_ticks_reaches_the_master_alone_and_who_hangs_is_killed(short_plan: Plan) -> None:
+def test_a_stop_during_ticks_is_sent_to_the_master_only_and_a_process_that_hangs_is_killed(
+    short_plan: Plan,
+) -> None:
     times = Times(ending(short_plan, agreed=True), {"master": 2.0, "recorder": 18.0}, wish=1.0)
     notice = short_plan.link.loss_timeout + longest_leave(short_plan) + MARGIN_S + resting(short_plan)
     assert times.asked["master"] == near(1.0)
@@ -111,7 +113,7 @@ def test_a_wish_during_ticks_reaches_the_master_alone_and_who_hangs_is_killed(sh
     assert notice + KILL_S == pytest.approx(27.5, abs=1.0)
 
 
-def test_a_lost_slave_is_the_masters_to_notice_and_the_recorder_ends_by_itself(short_plan: Plan) -> None:
+def test_after_a_slave_is_lost_master_and_recorder_end_without_being_asked(short_plan: Plan) -> None:
     times = Times(ending(short_plan, agreed=True), {"slave": 1.0, "master": 2.5, "recorder": 7.6})
     assert not times.asked
     assert not times.killed
@@ -120,7 +122,7 @@ def test_a_lost_slave_is_the_masters_to_notice_and_the_recorder_ends_by_itself(s
     assert hanging.killed == {"recorder": near(2.5 + WRITE_S)}
 
 
-def test_a_recorder_that_is_not_required_may_leave_a_running_test(short_plan: Plan) -> None:
+def test_a_recorder_that_is_not_required_may_end_during_a_test(short_plan: Plan) -> None:
     for required, asked in ((True, {"master", "slave"}), (False, set())):
         plan = dataclasses.replace(
             short_plan, recording=dataclasses.replace(short_plan.recording, required=required)
@@ -128,7 +130,7 @@ def test_a_recorder_that_is_not_required_may_leave_a_running_test(short_plan: Pl
         assert Times(ending(plan, agreed=True), {"recorder": 1.0}).asked.keys() == asked
 
 
-def test_a_laboratory_on_its_way_to_rest_is_killed_when_what_it_said_last_is_over(short_plan: Plan) -> None:
+def test_a_laboratory_on_its_ramp_is_killed_when_its_last_reported_time_is_over(short_plan: Plan) -> None:
     slow = ending(short_plan, agreed=True)
     slow.rests("master", 20.0, 15.0)
     times = Times(slow, {}, wish=1.0)
@@ -136,7 +138,7 @@ def test_a_laboratory_on_its_way_to_rest_is_killed_when_what_it_said_last_is_ove
     assert times.killed["slave"] < 30.0
 
 
-def test_a_wish_just_before_the_start_leaves_the_time_to_come_to_rest(short_plan: Plan) -> None:
+def test_a_stop_just_before_the_start_leaves_the_time_to_come_to_rest(short_plan: Plan) -> None:
     early = ending(short_plan, agreed=False)
     early.look(1.0, "stopped.", NAMES, {})
     early.agreed = True
@@ -149,11 +151,11 @@ def test_a_wish_just_before_the_start_leaves_the_time_to_come_to_rest(short_plan
 
 
 def said(process: str, state: State) -> Said:
-    """What a laboratory reports as it goes on in the handshake."""
+    """The report of a laboratory that proceeds in the handshake."""
     return Said(process, {"kind": "state", "lab": process, "state": state.value})
 
 
-def test_a_wish_while_a_rig_arms_leaves_it_the_time_that_the_others_would_wait_for_it(
+def test_a_stop_while_a_rig_arms_leaves_it_the_time_that_the_others_would_wait(
     processes: Processes, tmp_path: Path, short_plan: Plan, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr("time.monotonic", lambda: 20.0)
@@ -174,7 +176,7 @@ def test_a_wish_while_a_rig_arms_leaves_it_the_time_that_the_others_would_wait_f
     assert arming.kill_at("slave") == near(21.0 + LEAVE_S + KILL_S)
 
 
-def test_the_longest_way_to_rest_is_as_long_as_that_of_the_ramp(short_plan: Plan) -> None:
+def test_the_longest_time_to_rest_is_not_below_that_of_the_ramp(short_plan: Plan) -> None:
     usual, limits = short_plan.safety, short_plan.limits
     for safety in (
         usual,
@@ -196,7 +198,7 @@ WISH = "stopped by the user (SIGINT)."
 
 
 def program(folder: Path, name: str, text: str) -> None:
-    """A module that stands for a process of a test."""
+    """Writes a module that stands in for a process of a test."""
     (folder / f"{name}.py").write_text(text)
 
 
@@ -217,7 +219,7 @@ def processes(tmp_path: Path, monkeypatch: Any) -> Any:
 
 
 class Presses:
-    """A wish to stop that was expressed so often."""
+    """A request to stop that was made this many times."""
 
     def __init__(self, reason: str = "", presses: int = 0) -> None:
         self.reason, self.presses = reason, presses
@@ -226,7 +228,7 @@ class Presses:
         return self.reason
 
 
-def test_a_flood_of_lines_that_are_no_reports_is_read_to_its_end(
+def test_a_flood_of_text_lines_is_read_to_its_end(
     processes: Processes, tmp_path: Path, short_plan: Plan, capsys: Any
 ) -> None:
     text = "import json, os\nos.write(1, b'\\xff\\xfe\\n' + b'valve open\\n' * 20_000)\n"
@@ -240,7 +242,7 @@ def test_a_flood_of_lines_that_are_no_reports_is_read_to_its_end(
     assert "slave: ends the test (lost)\n" in err
 
 
-def test_a_pipe_that_a_grandchild_holds_keeps_nobody(
+def test_a_pipe_that_a_grandchild_holds_open_does_not_delay_the_end(
     processes: Processes, tmp_path: Path, short_plan: Plan
 ) -> None:
     program(
@@ -262,7 +264,7 @@ RAMPING = {"kind": "mode", "lab": "master", "mode": "ramping"}
 LEFT = {"kind": "resting", "lab": "master", "left": 0.5, "text": "unloading the column: 12.0 kN left"}
 
 
-def test_who_hangs_on_its_way_to_rest_is_killed_after_it_and_not_by_further_presses(
+def test_a_laboratory_that_hangs_on_its_ramp_is_killed_after_it_and_not_by_further_presses(
     processes: Processes, tmp_path: Path, short_plan: Plan, monkeypatch: Any, capsys: Any
 ) -> None:
     for name in ("LEAVE_S", "MARGIN_S", "KILL_S"):
@@ -286,7 +288,7 @@ def test_who_hangs_on_its_way_to_rest_is_killed_after_it_and_not_by_further_pres
     assert processes.killed == {"master"}
 
 
-def test_the_answer_to_a_second_wish_says_what_a_laboratory_is_at(
+def test_the_answer_to_a_second_stop_states_what_a_laboratory_is_doing(
     processes: Processes, tmp_path: Path, short_plan: Plan
 ) -> None:
     program(tmp_path, "master", DEAF)
@@ -300,7 +302,7 @@ def test_the_answer_to_a_second_wish_says_what_a_laboratory_is_at(
     assert "waiting for master" in answer(processes, doing)
 
 
-def test_who_hangs_after_anothers_end_is_killed_without_a_wish(
+def test_a_process_that_hangs_after_anothers_end_is_killed_without_a_request(
     processes: Processes, tmp_path: Path, short_plan: Plan, monkeypatch: Any
 ) -> None:
     for name in ("LEAVE_S", "MARGIN_S", "KILL_S"):
@@ -316,7 +318,7 @@ def test_who_hangs_after_anothers_end_is_killed_without_a_wish(
     assert isinstance(verdict(processes, ""), LostError)
 
 
-def test_a_leash_interrupts_when_its_last_holder_is_gone(tmp_path: Path) -> None:
+def test_a_child_is_interrupted_when_the_last_holder_of_its_pipe_has_ended(tmp_path: Path) -> None:
     if sys.platform != "linux":
         pytest.skip("Linux alone has it")
     program(tmp_path, "child", OBEDIENT)

@@ -1,4 +1,4 @@
-"""The cause that a run names at its end: of the laboratory that failed, not of those that followed it."""
+"""The cause that a run names at its end is that of the laboratory that failed first."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ NONE: tuple[tuple[str, int, str], ...] = (("master", 0, ""), ("slave", 0, ""), (
         (Over(("master", 3, ""), ("slave", 2, ""), asked="master"), WISH, InputError, "of the slave"),
     ],
 )
-def test_the_cause_is_that_of_who_did_not_follow_another(
+def test_the_cause_is_that_of_the_process_that_failed_first(
     over: Over, wish: str, kind: type[Exception], sentence: str
 ) -> None:
     error = verdict(over, wish)
@@ -135,7 +135,7 @@ def test_the_cause_is_that_of_who_did_not_follow_another(
     assert str(verdict(over, wish)) == str(error)
 
 
-def test_no_error_where_all_ended_with_0_even_if_somebody_wished() -> None:
+def test_no_error_is_reported_if_all_processes_end_with_0() -> None:
     assert verdict(Over(*NONE), "") is None
     assert verdict(Over(*NONE), WISH) is None
 
@@ -159,7 +159,7 @@ class BrokenTable:
     def disarm(self) -> None: ...
 
 
-def test_virtual_time_gives_the_cause_and_not_what_followed(
+def test_a_run_in_virtual_time_reports_the_first_cause(
     short_plan: Plan, tmp_path: Path, monkeypatch: Any
 ) -> None:
     monkeypatch.setattr("loop.rigs.find", lambda *_: BrokenTable)
@@ -173,7 +173,7 @@ def test_virtual_time_gives_the_cause_and_not_what_followed(
 
 
 class NoSink:
-    """Takes nothing."""
+    """A sink that discards everything."""
 
     failure = ""
     dropped = 0
@@ -184,7 +184,7 @@ class NoSink:
     def close(self, summary: Any, machines: Any) -> None: ...
 
 
-def test_a_recorder_that_is_asked_keeps_why_the_test_ended(short_plan: Plan) -> None:
+def test_a_recorder_that_is_asked_to_stop_keeps_the_cause_of_the_tests_end(short_plan: Plan) -> None:
     clock = VirtualClock()
     endpoint = MemoryHub(short_plan.roles).join("recorder", clock)
     for known, outcome in ((("lost", "The slave is gone."), "lost"), (("", ""), "stop")):

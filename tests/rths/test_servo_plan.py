@@ -45,7 +45,7 @@ def of_master(run: Run) -> dict[str, Any]:
     return run.columns["master"]
 
 
-def test_a_test_in_virtual_time_is_the_closed_loop_and_replays(call: Call, recording: Path) -> None:
+def test_a_test_in_virtual_time_equals_the_closed_loop_and_its_replay(call: Call, recording: Path) -> None:
     run, plan = read(recording), parse(BRIEF, Path())
     ground = substructure.ground_rows(plan, substructure.motion(plan))
     expected = signals(plan, closed_loop.simulate(plan, ground, seed=plan.test.seed))
@@ -54,21 +54,23 @@ def test_a_test_in_virtual_time_is_the_closed_loop_and_replays(call: Call, recor
     assert call("replay", recording) == 0
 
 
-def test_times_of_ticks_are_rounded_each_for_itself(recording: Path) -> None:
+def test_the_times_of_ticks_are_rounded_independently(recording: Path) -> None:
     run = read(recording)
     stamps = np.asarray(run.log_ns["master"]) - run.log_ns["master"][0]
     assert np.abs(stamps - np.arange(stamps.size) * 1e9 / 4096.0).max() <= 0.5
     assert set(np.diff(stamps).tolist()) == {244_140, 244_141}
 
 
-def test_the_report_and_the_summary_take_it(call: Call, recording: Path, capsys: Any, tmp_path: Path) -> None:
+def test_the_report_and_the_summary_accept_the_recording(
+    call: Call, recording: Path, capsys: Any, tmp_path: Path
+) -> None:
     assert call("inspect", recording) == 0
     assert "hybrid simulation error energy" in capsys.readouterr().out
     assert call("report", recording, "-o", tmp_path / "page.html") == 0
     assert "servo_hydraulic" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
-def test_the_pieces_of_a_diagnosis_are_replayed_to_the_noise(recording: Path) -> None:
+def test_the_parts_of_a_diagnosis_are_replayed_to_within_the_noise(recording: Path) -> None:
     run, plan = read(recording), parse(BRIEF, Path())
     built = record.build(run)
     lab, building = lab_a(built), Building(built)
@@ -90,7 +92,7 @@ def test_the_pieces_of_a_diagnosis_are_replayed_to_the_noise(recording: Path) ->
     assert not offered & {"actuator.time_constant", "actuator.backlash"}
 
 
-def test_an_effect_that_it_cannot_have_is_refused_with_a_sentence(
+def test_an_effect_that_servo_hydraulics_cannot_have_is_refused_in_one_sentence(
     call: Call, plan_file: Path, capsys: Any, tmp_path: Path
 ) -> None:
     secret = tmp_path / "secret.toml"
@@ -100,7 +102,9 @@ def test_an_effect_that_it_cannot_have_is_refused_with_a_sentence(
     assert "'actuator.backlash' needs the actuator model 'fopdt', but the plan has 'servo_hydraulic'" in error
 
 
-def test_it_simulates_with_ideal_transfer_systems(call: Call, plan_file: Path, tmp_path: Path) -> None:
+def test_the_plan_is_simulated_with_ideal_transfer_systems(
+    call: Call, plan_file: Path, tmp_path: Path
+) -> None:
     path = tmp_path / "ideal.mcap"
     assert call("simulate", plan_file, "--ideal", "-o", path) == 0
     columns = of_master(read(path))
@@ -110,7 +114,7 @@ def test_it_simulates_with_ideal_transfer_systems(call: Call, plan_file: Path, t
 
 
 @pytest.mark.slow
-def test_the_bench_finds_the_lag_that_comes_nearest(
+def test_identification_finds_the_lag_that_is_closest_to_servo_hydraulics(
     call: Call, plan_file: Path, capsys: Any, tmp_path: Path
 ) -> None:
     path = tmp_path / "bench.mcap"

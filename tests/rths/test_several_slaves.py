@@ -40,7 +40,7 @@ def recording(two: Plan, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_inspect_has_every_topic_and_a_latency_table_per_slave(
+def test_inspect_shows_every_topic_and_a_latency_table_per_slave(
     call: Any, capsys: Any, recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
@@ -72,7 +72,7 @@ def test_replay_matches_to_the_last_bit(call: Any, capsys: Any, recording: Path)
     assert all(match["compared"] >= 1999 for match in signals.values())
 
 
-def test_replay_finds_one_bit_of_one_slave(call: Any, recording: Path, monkeypatch: Any) -> None:
+def test_replay_finds_one_changed_bit_of_one_slave(call: Any, recording: Path, monkeypatch: Any) -> None:
     from rths.examine import replay
 
     found = read(recording)
@@ -103,7 +103,7 @@ def test_export_spreads_the_arrays(suffix: str, call: Any, recording: Path, tmp_
     assert np.array_equal(columns["slave_roof_damper_force"], found.columns["slave.roof"]["damper_force"])
 
 
-def test_what_is_exported_can_be_imported_slave_by_slave(
+def test_exported_data_can_be_imported_slave_by_slave(
     call: Any, recording: Path, plan_file: Path, tmp_path: Path
 ) -> None:
     assert call("export", recording, "-o", tmp_path / "two.csv") == 0
@@ -142,7 +142,7 @@ def test_an_import_that_names_no_slave_is_refused(
     assert message in capsys.readouterr().err
 
 
-def test_simulate_and_compare_take_a_plan_with_several(
+def test_simulate_and_compare_accept_a_plan_with_several_slaves(
     call: Any, capsys: Any, recording: Path, plan_file: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / "simulated.mcap"
@@ -161,7 +161,7 @@ def test_simulate_and_compare_take_a_plan_with_several(
     assert call("compare", recording, path, "--tolerance", "0") == 0
 
 
-def test_a_simulated_reality_is_the_test_to_the_last_bit(
+def test_a_simulated_reality_equals_the_test_to_the_last_bit(
     two: Plan, call: Any, capsys: Any, plan_file: Path, tmp_path: Path
 ) -> None:
     truth = tmp_path / "truth.toml"
@@ -182,13 +182,13 @@ def test_a_simulated_reality_is_the_test_to_the_last_bit(
     assert "[slave.roof.rig] names a plug-in" in capsys.readouterr().err
 
 
-def test_a_simulation_beyond_a_limit_is_exit_code_1(call: Any, capsys: Any, plan_file: Path) -> None:
+def test_a_simulation_beyond_a_limit_gives_exit_code_1(call: Any, capsys: Any, plan_file: Path) -> None:
     assert call("simulate", plan_file, "--uncompensated", "--no-amd", "--scale", "2.0", "--json") == 1
     assert "beyond its limit" in json.loads(capsys.readouterr().out)["beyond_limit"]
 
 
 @pytest.mark.parametrize("part", ["column", "actuator"])
-def test_bench_refuses_a_slaves_name_for_what_is_the_masters(
+def test_bench_refuses_a_slaves_name_for_a_part_of_the_master(
     part: str, call: Any, capsys: Any, plan_file: Path, tmp_path: Path
 ) -> None:
     assert call("bench", part, plan_file, "--name", "cellar", "-o", tmp_path / "a.mcap") == 2
@@ -217,7 +217,7 @@ def test_an_unknown_compensator_is_named_with_the_table_that_holds_it(
 
 
 @pytest.mark.slow
-def test_bench_wants_a_slaves_name_for_its_parts_and_identify_finds_them_again(
+def test_bench_requires_a_slaves_name_for_its_parts_and_identify_finds_them(
     call: Any, capsys: Any, plan_file: Path, recording: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / "table.mcap"
@@ -234,7 +234,7 @@ def test_bench_wants_a_slaves_name_for_its_parts_and_identify_finds_them_again(
     assert parts["damper.cellar"]["parameters"]["mass"]["value"] == pytest.approx(20.0, rel=0.05)
 
 
-def test_a_diagnosis_says_in_which_laboratory_the_gap_lies(
+def test_a_diagnosis_names_the_laboratory_with_the_gap(
     two: Plan, call: Any, capsys: Any, tmp_path: Path
 ) -> None:
     friction = {"name": "damper.friction", "force": 3.0, "slave": "cellar"}
@@ -248,7 +248,7 @@ def test_a_diagnosis_says_in_which_laboratory_the_gap_lies(
     assert "damper friction: force 3." in cellar or "damper friction: force 2.9" in cellar
 
 
-def test_a_report_for_a_file_is_of_one_laboratory_of_the_recordings_own_slaves(
+def test_a_diagnosis_to_a_file_requires_the_name_of_one_slave_of_the_recording(
     call: Any, capsys: Any, recording: Path, virtual_recording: Path, plan_file: Path, tmp_path: Path
 ) -> None:
     for words, sentence in (
@@ -266,7 +266,7 @@ def test_a_report_for_a_file_is_of_one_laboratory_of_the_recordings_own_slaves(
         assert err.count("\n") == 1
 
 
-def test_run_in_virtual_time(
+def test_a_run_with_two_slaves_in_virtual_time_is_completed(
     call: Any, capsys: Any, plan_file: Path, recording: Path, tmp_path: Path
 ) -> None:
     assert call("run", plan_file, "--virtual", "-o", tmp_path / "a.mcap") == 0
@@ -274,7 +274,9 @@ def test_run_in_virtual_time(
     assert call("compare", recording, tmp_path / "a.mcap", "--tolerance", "0") == 0
 
 
-def test_a_slave_has_to_say_which_it_is(call: Any, capsys: Any, plan_file: Path) -> None:
+def test_the_slave_command_requires_the_name_of_a_planned_slave(
+    call: Any, capsys: Any, plan_file: Path
+) -> None:
     for words, sentence in (
         ((plan_file,), "say which one this is with --name (roof, cellar)"),
         ((plan_file, "--name", "rof"), "The plan names no slave 'rof': did you mean roof?"),

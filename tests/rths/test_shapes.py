@@ -62,11 +62,11 @@ def run(shape: str, recording: Callable[[str], Path]) -> Run:
     return read(recording(shape))
 
 
-def test_every_laboratory_is_there_under_a_name_of_its_own(shape: str, run: Run) -> None:
+def test_every_laboratory_is_shown_under_its_own_name(shape: str, run: Run) -> None:
     assert [lab.name for lab in laboratories(run)] == NAMES[shape]
 
 
-def test_the_summary_says_how_every_laboratory_followed(shape: str, run: Run) -> None:
+def test_the_summary_states_how_every_laboratory_tracked_its_target(shape: str, run: Run) -> None:
     found = summarize(run)
     json.dumps(found)
     assert set(found["tracking"]) == SYSTEMS[shape]
@@ -79,7 +79,7 @@ def test_the_summary_says_how_every_laboratory_followed(shape: str, run: Run) ->
     assert ("shear" in found["storeys"][0]) is not shape.startswith("own")
 
 
-def test_shear_counts_the_columns_of_every_laboratory(recording: Callable[[str], Path]) -> None:
+def test_the_storey_shear_includes_the_columns_of_every_laboratory(recording: Callable[[str], Path]) -> None:
     found = summarize(read(recording("two_storeys")))["storeys"]
     run = read(recording("two_storeys"))
     own, used = run.columns["master"]["column_force"], run.columns["master"]["column_force_used"]
@@ -88,7 +88,7 @@ def test_shear_counts_the_columns_of_every_laboratory(recording: Callable[[str],
     assert found[1]["shear"]["peak"] == pytest.approx(abs(numerical[:, 1] + used).max())
 
 
-def test_pictures_have_an_axis_of_every_laboratory_and_no_two_lines_of_one_name(shape: str, run: Run) -> None:
+def test_pictures_have_an_axis_per_laboratory_and_unique_names_of_lines(shape: str, run: Run) -> None:
     for part in views(run).values():
         labs = laboratories(part)
         for name, count in (
@@ -134,7 +134,7 @@ def test_the_live_page_has_plots_of_every_laboratory(
             assert len(stream.source.data[lab.channels.position]) > 100
 
 
-def test_layout_and_export_hold_every_laboratory(
+def test_layout_and_export_contain_every_laboratory(
     shape: str, run: Run, recording: Callable[[str], Path]
 ) -> None:
     panels = layout.layout(layout.of_recording(recording(shape)))["configById"]

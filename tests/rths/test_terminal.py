@@ -24,7 +24,7 @@ STARTED = {**REPORT, "t": 0.0, "round_trip": math.nan, "missed": 0.0}
 
 
 class Terminal(io.StringIO):
-    """A terminal as far as the board needs one."""
+    """A terminal with the functions that the display needs."""
 
     def isatty(self) -> bool:
         return True
@@ -54,7 +54,7 @@ def terminal(monkeypatch: Any) -> Terminal:
     return Terminal()
 
 
-def test_elsewhere_it_is_a_plain_line_every_five_seconds() -> None:
+def test_without_a_terminal_the_display_is_a_plain_line_every_five_seconds() -> None:
     stream = io.StringIO()
     progress = RunProgress(40.0, stream)
     for t in (0.0, 0.2, 4.9, 5.0, 5.2):
@@ -69,7 +69,7 @@ def test_elsewhere_it_is_a_plain_line_every_five_seconds() -> None:
     )
 
 
-def test_on_a_terminal_the_board_stays_in_place_and_lines_go_above_it(terminal: Terminal) -> None:
+def test_on_a_terminal_the_display_stays_in_place_and_lines_appear_above_it(terminal: Terminal) -> None:
     progress = RunProgress(40.0, terminal)
     progress.say("starting")
     for tenth in range(30):
@@ -103,7 +103,7 @@ def test_no_line_is_wider_than_the_terminal(columns: int, terminal: Terminal, mo
         assert any(len(line) > 150 for line in terminal.screen())
 
 
-def test_a_low_terminal_has_what_fits(terminal: Terminal, monkeypatch: Any) -> None:
+def test_a_low_terminal_shows_the_lines_that_fit(terminal: Terminal, monkeypatch: Any) -> None:
     monkeypatch.setenv("LINES", "3")
     progress = RunProgress(40.0, terminal)
     for _ in range(3):
@@ -138,11 +138,11 @@ def test_a_dumb_terminal_gets_plain_lines(terminal: Terminal, monkeypatch: Any) 
         ([-1.0, 1.0], "▁█"),
     ],
 )
-def test_a_sparkline_reaches_from_the_smallest_to_the_largest(values: list[float], expected: str) -> None:
+def test_a_sparkline_spans_from_the_smallest_to_the_largest_value(values: list[float], expected: str) -> None:
     assert sparkline(values) == expected
 
 
-def test_a_report_without_a_signal_has_no_line_of_it() -> None:
+def test_a_signal_that_is_missing_in_the_report_has_no_line() -> None:
     board = Board(1.0)
     board.take({"t": 0.5})
     assert len(board.lines(80)) == 1

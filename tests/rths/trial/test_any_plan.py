@@ -1,4 +1,4 @@
-"""The blind trial of any plan: where effects are laid, what stands in for a laboratory, and which report counts."""
+"""The blind trial of any plan: where effects are hidden, the independent laboratories, and the report that counts."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def trial_of(name: str) -> TrialBasis:
 
 
 @pytest.mark.parametrize("name", NAMES, ids=lambda name: Path(name).stem)
-def test_effects_lie_in_every_laboratory_and_every_case_can_be_built(name: str) -> None:
+def test_effects_are_hidden_in_every_laboratory_and_every_case_can_be_built(name: str) -> None:
     cases = draw(24, 1, "judge", trial=trial_of(name))
     assert {item.role for case in cases for item in case.laid} - {""} == set(trial_of(name).plan.kinds)
     for case in cases:
@@ -66,7 +66,7 @@ def test_laboratories_of_one_kind_share_its_effects_by_name() -> None:
     assert all(columns.library.places[item.name] == (MASTER, "slave.east") for item in laid)
 
 
-def test_true_parameters_of_two_columns_are_drawn_apart() -> None:
+def test_true_parameters_of_two_columns_are_drawn_independently() -> None:
     (case,) = draw(1, 1, "judge", trial=trial_of("two_columns"), only=["clean"])
     own, east = case.truths["column"], case.truths["slave"]["east"]["column"]
     assert own["stiffness"] != east["stiffness"]
@@ -75,13 +75,13 @@ def test_true_parameters_of_two_columns_are_drawn_apart() -> None:
 
 
 @pytest.mark.parametrize("name", ["two_dampers", "two_slaves"])
-def test_the_oracle_moves_the_parameters_of_the_laboratory_that_it_looks_at(name: str) -> None:
+def test_the_oracle_varies_the_parameters_of_the_laboratory_that_it_judges(name: str) -> None:
     (case,) = draw(1, 1, "judge", trial=trial_of(name), only=["clean"])
     for role, kind in trial_of(name).plan.kinds.items():
         assert len(neighbours(case, role)) == {"column": 4, "table": 7}[kind]
 
 
-def test_a_users_kind_is_hidden_in_by_its_own_effects_and_tolerances() -> None:
+def test_cases_of_a_users_kind_are_drawn_from_its_own_effects_and_tolerances() -> None:
     trial = trial_of(DAMPER)
     assert {"device.leak", "device.air"} < set(trial.library.catalogue)
     assert trial.library.formulas["device.leak"] == (OWN_KERNEL,)
@@ -108,7 +108,7 @@ def readings(lab: Any, command: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     return np.array(rows)
 
 
-def test_a_laboratory_of_a_users_kind_is_its_own_kernel_until_something_is_wrong_with_it() -> None:
+def test_a_laboratory_of_a_users_kind_runs_its_own_kernel_unless_it_has_an_effect() -> None:
     plan = plans.load(cli.plan_path(DAMPER))
     silent = {"noise": {"piston_displacement": 0.0, "piston_force": 0.0}}
     command = 0.02 * np.sin(9.0 * np.arange(600) * 0.002)
@@ -163,7 +163,7 @@ def test_an_effect_must_be_named_in_its_own_laboratory() -> None:
     )
 
 
-def test_of_several_slaves_the_report_on_the_one_with_the_effect_counts() -> None:
+def test_with_several_slaves_the_report_on_the_one_with_the_effect_counts() -> None:
     found = said("explained", "damper.friction", site="damper")
     reports = {"roof": said("no_gap"), "middle": found}
     middle, roof = (

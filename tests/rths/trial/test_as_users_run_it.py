@@ -17,7 +17,7 @@ CALM = ("no_gap", "within_tolerances")  # verdicts that name no effect
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_the_diagnosis_meets_withheld_effects(tmp_path: Path) -> None:
+def test_the_diagnosis_names_hidden_effects_in_real_recordings(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "rths", "blind", "--cases", str(CASES), "--duration", "20"]
     command += ["--jobs", "2", "--seed", "7", "-o", str(tmp_path / "trial"), "--json"]
     done = finished(*command, seconds=500.0, cwd=ROOT, env=environment())

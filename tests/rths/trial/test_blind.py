@@ -1,4 +1,4 @@
-"""The blind trial end to end with a stand-in for the diagnosis: what it is given, what comes out, what is refused."""
+"""The blind trial end to end with a stand-in for the diagnosis: its input, its results, and refusals."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def no_gap(_path: Path) -> Report:
 
 
 def spy(path: Path) -> Report:
-    """A diagnosis that tells what it could see."""
+    """A diagnosis that reports which files and arguments it could see."""
     seen = {
         "environment": dict(os.environ),
         "words": sys.argv,
@@ -99,7 +99,7 @@ def command(*words: str) -> int:
     return cli.guarded(lambda: blind.run(parser.parse_args(words)))
 
 
-def test_a_recording_says_nothing_of_what_it_hides(tmp_path: Path) -> None:
+def test_a_recording_contains_nothing_about_its_hidden_effect(tmp_path: Path) -> None:
     (case,) = cases(1, "catalogue")
     found = record(case, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [found.name]
@@ -112,7 +112,7 @@ def test_a_recording_says_nothing_of_what_it_hides(tmp_path: Path) -> None:
     assert run.ticks("master") == 750
 
 
-def test_the_size_is_that_of_the_effect(tmp_path: Path) -> None:
+def test_the_recorded_size_is_that_of_the_effect(tmp_path: Path) -> None:
     made = cases(4, "catalogue", duration=4.0, effects=["damper.friction"])
     sizes = {case.laid[0].parameters["force"]: record(case, tmp_path).sizes[0] for case in made}
     assert sizes[max(sizes)] > sizes[min(sizes)] > 0.0
@@ -137,7 +137,7 @@ def test_the_diagnosing_process_sees_recordings_only(tmp_path: Path, monkeypatch
         assert all("reports" in name or "complaints" in name for name in seen["there"])
 
 
-def test_a_failing_diagnosis_does_not_take_the_others_with_it(tmp_path: Path) -> None:
+def test_a_failing_diagnosis_does_not_affect_the_other_cases(tmp_path: Path) -> None:
     list(record_all(cases(2), tmp_path))
     answers = diagnose_all(tmp_path, diagnosis=f"{HERE}:broken")
     assert [item.error for item in answers.values()] == ["ValueError: nothing works"] * 2
@@ -192,7 +192,9 @@ def test_the_goal_of_a_mean_share_is_judged_by_its_interval() -> None:
     assert predictions.share_inside([0.7, 1.0]).passed is None
 
 
-def test_the_command_scores_and_keeps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_scores_the_cases_and_keeps_the_results(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     code = command(
         "--cases", "4", "--seed", "1", "--set", "tune", "--duration", "1.5", "--keep", "--json",
         "--diagnosis", f"{HERE}:no_gap", "-o", str(tmp_path / "out"),
@@ -233,7 +235,7 @@ def test_the_command_passes_where_every_goal_is_met(
         (("--effects", "damper.frictoin"), "Unknown 'damper.frictoin': did you mean damper.friction?"),
     ],
 )
-def test_bad_usage_is_one_sentence(
+def test_wrong_usage_gives_one_sentence(
     words: tuple[str, ...], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert command(*words, "-o", str(tmp_path)) == 2
@@ -258,7 +260,7 @@ def without(package: str) -> Callable[[str], Any]:
         (("--dask", "tcp://127.0.0.1:1"), "distributed", "`make cluster` installs it"),
     ],
 )
-def test_a_missing_package_is_one_sentence(
+def test_a_missing_package_gives_one_sentence(
     words: tuple[str, ...],
     package: str,
     how: str,

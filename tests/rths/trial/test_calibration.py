@@ -28,7 +28,7 @@ def test_a_calibration_without_cases_is_refused() -> None:
         calibration.brier(np.array([1.1]), np.array([1.0]))
 
 
-def test_known_errors() -> None:
+def test_known_calibrations_have_the_expected_error() -> None:
     stated, came = np.array([0.9, 0.9, 0.2, 1.0]), np.array([True, False, False, True])
     assert calibration.brier(stated, came) == pytest.approx((0.01 + 0.81 + 0.04) / 4)
     assert calibration.expected_calibration_error(stated, came) == pytest.approx(

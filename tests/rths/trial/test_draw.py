@@ -1,4 +1,4 @@
-"""Cases: the same for the same seed, other ones in other sets, with truths and effects in their ranges."""
+"""The drawing of cases: reproducible by seed, different between sets, with truths and effects in their ranges."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_the_sets_are_disjoint() -> None:
     assert not {case.seed for case in judge} & {case.seed for case in tune}
 
 
-def test_what_is_not_asked_for_is_passed_over() -> None:
+def test_cases_that_are_not_asked_for_are_skipped() -> None:
     every = {case.index: case for case in draw(60, 2, "tune")}
     pairs = draw(2, 2, "tune", only=["pair"])
     assert pairs == [case for case in every.values() if case.kind == "pair"][:2]
@@ -87,7 +87,7 @@ def test_what_is_not_asked_for_is_passed_over() -> None:
     assert all(case.laid for case in named)
 
 
-def test_kinds_come_in_their_shares() -> None:
+def test_kinds_of_cases_are_drawn_in_their_shares() -> None:
     kinds = [begin(index, 0, "judge", LIBRARY).kind for index in range(4000)]
     for kind, share in SHARES.items():
         assert kinds.count(kind) / 4000 == pytest.approx(share, abs=0.025)
@@ -127,7 +127,7 @@ def test_the_independent_laboratory_has_the_true_parameters() -> None:
     assert case.reality((), silent=True)["slave"]["rig"]["options"]["effects"] == []
 
 
-def test_a_factor_goes_both_ways_between_its_sizes() -> None:
+def test_a_factor_is_drawn_above_and_below_one_between_its_sizes() -> None:
     generator = np.random.default_rng(0)
     values = np.array([draw_parameter(generator, FACTOR) for _ in range(500)])
     moves = np.abs(values - 1.0)
@@ -139,7 +139,7 @@ def test_a_factor_goes_both_ways_between_its_sizes() -> None:
     assert min(strong) >= math.sqrt(0.01 * 0.3) - 1e-9
 
 
-def test_a_force_has_one_side_and_a_limit_no_null() -> None:
+def test_a_force_is_drawn_on_one_side_and_a_limit_without_a_null_value() -> None:
     generator = np.random.default_rng(0)
     assert len(distances(FRICTION.parameters[0])) == 1
     limit = Parameter("force", "N", null=math.inf, least=1.0, most=1e6, sizes=(200.0, 50.0))
@@ -151,7 +151,7 @@ def test_a_force_has_one_side_and_a_limit_no_null() -> None:
     assert -1.0 <= between(generator, -1.0, 3.0) <= 3.0
 
 
-def test_an_effect_inside_the_tolerances_is_no_gap() -> None:
+def test_an_effect_within_the_tolerances_is_not_a_gap() -> None:
     cases = draw(150, 1, "judge", effects=["column.stiffness"], only=["catalogue"])
     assert {case.inside for case in cases} == {True, False}
     for case in cases:
@@ -166,13 +166,13 @@ def test_unknown_names_and_empty_choices_are_refused() -> None:
         draw(1, 0, "judge", effects=["damper.fricton"])
 
 
-def test_nothing_is_found_where_there_is_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_clean_cases_with_an_effect_asked_for_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("validation.blind.draw.PATIENCE", 200)
     with pytest.raises(InputError, match="There is no case of kind clean with damper"):
         draw(1, 0, "judge", only=["clean"], effects=["damper.friction"])
 
 
-def test_the_drift_is_sensible() -> None:
+def test_the_drift_of_a_drawn_case_is_plausible() -> None:
     assert TRIAL.drift("el_centro_1940_ns", damper=True) == pytest.approx(0.0489, rel=0.02)
     for case in draw(10, 8, "judge"):
         motion = case.plan["ground_motion"]
@@ -196,12 +196,12 @@ CASES, WHOLE = 600, 6  # cases that are begun, and those of them that are drawn 
 
 @pytest.fixture(scope="module")
 def begun(shipped: TrialBasis) -> list[Beginning]:
-    """The beginnings of cases from the catalogue as it is."""
+    """The first cases drawn from the present catalogue."""
     return [begin(index, 2026, "judge", shipped.library) for index in range(CASES)]
 
 
 @pytest.mark.parametrize("added", [MADE_UP, OF_READING], ids=["physics", "reading"])
-def test_a_further_effect_leaves_every_case_of_the_others_as_it_was(
+def test_an_added_effect_does_not_change_the_cases_of_other_effects(
     added: Effect, shipped: TrialBasis, begun: list[Beginning]
 ) -> None:
     old = shipped.library
@@ -223,7 +223,7 @@ def test_a_further_effect_leaves_every_case_of_the_others_as_it_was(
     assert expected / 2.0 < mine < expected * 2.0
 
 
-def test_a_further_parameter_leaves_the_others_as_they_were() -> None:
+def test_an_added_parameter_does_not_change_the_others() -> None:
     parameters = (replace(RISE, name="warmth"), *FRICTION.parameters)
     more = replace(FRICTION, parameters=parameters, apply=lambda system, **_: system)
     library = replace(LIBRARY, catalogue={**LIBRARY.catalogue, FRICTION.name: more})
@@ -235,7 +235,7 @@ def test_a_further_parameter_leaves_the_others_as_they_were() -> None:
         assert (new.plan, new.truths, new.seed) == (old.plan, old.truths, old.seed)
 
 
-def test_every_family_is_drawn_alike_and_every_signal_of_it(shipped: TrialBasis) -> None:
+def test_every_family_of_effects_is_drawn_equally_often_with_every_signal(shipped: TrialBasis) -> None:
     library = shipped.library
     names = [of_catalogue(library, 1, "judge", index, "effect") for index in range(3000)]
     families = Counter(library.catalogue[name].family for name in names)

@@ -1,4 +1,4 @@
-"""What actuator, column, table and damper of the trial's laboratories do under an effect."""
+"""The motion of actuator, column, table and damper of the trial's laboratories under an effect."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def paired(by: Trace, values: Trace) -> tuple[Trace, Trace]:
 
 
 @pytest.mark.parametrize("formula", KNOWN_A["column.yielding"].formulas)
-def test_yielding_begins_elastic_bends_and_dissipates(formula: str) -> None:
+def test_a_yielding_column_begins_elastic_softens_and_dissipates(formula: str) -> None:
     found = play_a(effect("column.yielding", formula, yield_displacement=1e-3, hardening=0.05))
     x, f = found["column_displacement"], found["column_force"]
     first = np.abs(np.maximum.accumulate(np.abs(x))) < 0.3e-3
@@ -59,7 +59,7 @@ def test_takeda_softens_as_it_unloads() -> None:
     assert slope == pytest.approx(12.5e6 * (1e-3 / np.max(found["column_displacement"])) ** 0.4, rel=0.01)
 
 
-def test_the_valve_limits_the_speed_and_the_load_the_way() -> None:
+def test_the_valve_limits_the_speed_and_load_or_play_reduces_the_displacement() -> None:
     for formula in ("smooth", "orifice"):
         slow = play_a(effect("actuator.velocity_limit", formula, velocity=0.015))
         speed = np.max(np.abs(np.diff(slow["column_displacement"]))) / DT
@@ -74,7 +74,7 @@ def test_the_valve_limits_the_speed_and_the_load_the_way() -> None:
         assert short["column_force"][-1] == pytest.approx(12.5e6 * (2e-3 - 0.5 * width), rel=1e-3)
 
 
-def test_friction_stops_and_drags_the_damper() -> None:
+def test_friction_stops_the_damper_and_reduces_its_stroke() -> None:
     still = np.zeros(TIMES.size)
     held = play_b(
         effect("damper.friction", "lugre", force=5.0), command=still, motor=np.full(TIMES.size, 3.0)
@@ -89,7 +89,7 @@ def test_friction_stops_and_drags_the_damper() -> None:
         assert np.std(found["damper_stroke"]) < np.std(CLEAN["damper_stroke"])
 
 
-def test_the_damper_pushes_the_table_and_obeys_its_mass() -> None:
+def test_the_dampers_force_moves_the_table_and_equals_mass_times_acceleration() -> None:
     found = play_b(effect("damper.friction", "dahl", force=5.0))
     s = found["damper_stroke"]
     acceleration = np.gradient(np.gradient(s, DT), DT) + found["table_acceleration"]
@@ -101,7 +101,7 @@ def test_the_damper_pushes_the_table_and_obeys_its_mass() -> None:
     assert play_b(command=still, motor=push)["damper_force"][1] < 0.0
 
 
-def test_stops_and_limits_hold() -> None:
+def test_strokes_stay_within_the_end_stop_and_forces_within_the_limit() -> None:
     for formula in ("hertz", "linear"):
         found = play_b(effect("damper.stroke_stop", formula, stroke=0.015, stiffness=200e3))
         assert np.max(np.abs(found["damper_stroke"])) < 0.021
@@ -111,7 +111,7 @@ def test_stops_and_limits_hold() -> None:
     assert found["damper_force"][10] == pytest.approx(-40.0, abs=4.0)
 
 
-def test_a_motor_without_lag_obeys_at_once() -> None:
+def test_a_motor_without_lag_follows_at_once() -> None:
     found = play_b(
         effect("damper.motor_lag", time_constant=-0.05), command=np.zeros(3), motor=np.full(3, 10.0)
     )
@@ -119,7 +119,7 @@ def test_a_motor_without_lag_obeys_at_once() -> None:
 
 
 @pytest.mark.parametrize("name", ["actuator.delay", "table.delay"])
-def test_pade_delays(name: str) -> None:
+def test_pades_approximation_delays_as_asked_for(name: str) -> None:
     """Padé's approximation of 8 ms more delays as the ring does; of 2 ms less, too."""
     for more in (0.008, -0.002):
         found = play(effect(name, "", delay=more))

@@ -1,4 +1,4 @@
-"""What the sensors of the trial's laboratories read."""
+"""The sensor readings of the trial's laboratories."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from validation.blind.labs.column_lab import TrueColumnLab
 
 
 @pytest.mark.parametrize("signal", SIGNALS)
-def test_readings_are_falsified_one_by_one(signal: str) -> None:
+def test_readings_are_falsified_independently(signal: str) -> None:
     clean, size = CLEAN[signal], float(np.max(np.abs(CLEAN[signal])))
     other = [name for name in (SIGNALS_A if signal in SIGNALS_A else SIGNALS_B) if name != signal]
     wanted = {
@@ -46,7 +46,7 @@ def test_readings_are_falsified_one_by_one(signal: str) -> None:
     assert np.std(noisy[signal] - clean) == pytest.approx(0.01 * size, rel=0.05)
 
 
-def test_a_lag_is_a_delay_at_low_frequency() -> None:
+def test_a_lag_acts_as_a_delay_at_low_frequency() -> None:
     slow = RISE * 1e-3 * np.sin(4.0 * TIMES)
     clean = play_a(command=slow)["column_displacement"]
     for formula in ("butterworth", "first_order"):
@@ -56,7 +56,7 @@ def test_a_lag_is_a_delay_at_low_frequency() -> None:
         assert not near(found["column_displacement"], clean, 5e-3)
 
 
-def test_readings_leak_and_get_lost() -> None:
+def test_readings_have_crosstalk_and_missing_samples() -> None:
     leak = play_b(effect("x.sensor.table_acceleration.crosstalk", coefficient=1e-3))
     extra = leak["table_acceleration"] - CLEAN["table_acceleration"]
     assert np.allclose(extra, 1e-3 * CLEAN["damper_force"], atol=1e-12)
@@ -66,7 +66,7 @@ def test_readings_leak_and_get_lost() -> None:
     assert np.array_equal(lost[101:][~repeated], CLEAN["column_force"][101:][~repeated])
 
 
-def test_noise_is_white_and_of_its_level_and_follows_the_seed() -> None:
+def test_noise_is_white_has_its_level_and_depends_on_the_seed() -> None:
     still = np.zeros(TIMES.size)
     found = play_b(command=still, motor=still, sensors={})
     for name, level in zip(SIGNALS_B, (10e-6, 0.01, 2e-6, 0.2), strict=True):

@@ -49,7 +49,7 @@ from validation.blind.labs.column_lab import TrueColumnLab
 from validation.blind.labs.table_lab import TrueTableLab
 
 
-def test_a_clean_laboratory_a_is_the_nominal_model() -> None:
+def test_a_clean_laboratory_a_equals_the_nominal_model() -> None:
     ticks = 1000
 
     def rate(t: float, y: Trace) -> list[float]:
@@ -62,7 +62,7 @@ def test_a_clean_laboratory_a_is_the_nominal_model() -> None:
     assert near(CLEAN["column_force"][:ticks], 12.5e6 * exact)
 
 
-def test_a_clean_laboratory_b_is_the_nominal_model() -> None:
+def test_a_clean_laboratory_b_equals_the_nominal_model() -> None:
     ticks = 1000
     omega, zeta, m, k, c, lag = 2.0 * math.pi * 15.0, 0.7, 16.0, 56.8, 6.0, 0.003
 
@@ -85,7 +85,7 @@ def test_a_clean_laboratory_b_is_the_nominal_model() -> None:
         assert near(CLEAN[name][:ticks], values), name
 
 
-def test_true_parameters_are_taken() -> None:
+def test_true_parameters_are_used_by_the_laboratories() -> None:
     soft = play_a(column={"stiffness": 10e6})
     assert near(soft["column_force"], 0.8 * CLEAN["column_force"], 1e-9)
     late = play_a(actuator={"delay": 0.016})
@@ -95,7 +95,7 @@ def test_true_parameters_are_taken() -> None:
     assert not near(play_b(damper={"mass": 20.0})["damper_stroke"], CLEAN["damper_stroke"], 0.05)
 
 
-def test_the_registries_agree() -> None:
+def test_the_registries_of_formulas_and_effects_agree() -> None:
     known = {**KNOWN_A, **KNOWN_B}
     assert set(FORMULAS).isdisjoint(PLAIN)
     for name, formulas in FORMULAS.items():
@@ -172,7 +172,7 @@ FORMS = [(name, formula) for name in CASES for formula in KNOWN[name].formulas]
 
 
 @pytest.mark.parametrize(("name", "formula"), FORMS)
-def test_a_formula_moves_its_signals_and_no_others(name: str, formula: str) -> None:
+def test_an_effects_formula_changes_its_signals_and_no_others(name: str, formula: str) -> None:
     found = play(effect(name, formula, **CASES[name][0]))
     assert all(np.isfinite(values).all() for values in found.values())
     for signal, change in changes(found).items():
@@ -184,7 +184,7 @@ def test_a_formula_moves_its_signals_and_no_others(name: str, formula: str) -> N
 
 
 @pytest.mark.parametrize(("name", "formula"), FORMS)
-def test_a_formula_without_size_is_the_clean_laboratory(name: str, formula: str) -> None:
+def test_an_effect_of_zero_size_equals_the_clean_laboratory(name: str, formula: str) -> None:
     found = changes(play(effect(name, formula, **CASES[name][1])))
     # platform and loop stay two bodies however small the play: 0.3 % of the acceleration
     assert max(found.values()) < (5e-3 if name == "table.backlash" else 1e-3)
@@ -196,7 +196,7 @@ def test_every_effect_on_physics_is_tested() -> None:
 
 @pytest.mark.parametrize("name", UNCATALOGUED)
 @pytest.mark.parametrize("end", [0, 1])
-def test_sizes_outside_the_catalogue_are_seen_and_bearable(name: str, end: int) -> None:
+def test_sizes_outside_the_catalogue_change_the_signals_without_divergence(name: str, end: int) -> None:
     _, parameters, sizes = UNCATALOGUED[name]
     found = play(effect(name, "", **dict(zip(parameters, (size[end] for size in sizes), strict=True))))
     assert all(np.isfinite(values).all() for values in found.values())
@@ -223,14 +223,14 @@ def test_sizes_outside_the_catalogue_are_seen_and_bearable(name: str, end: int) 
         ({"column": {"model": "bouc_wen"}}, "is linear"),
     ],
 )
-def test_what_makes_no_sense_is_refused(options: dict[str, Any], words: str) -> None:
+def test_meaningless_effects_and_parameters_are_refused(options: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         TrueColumnLab(DT, 1, **options)
     with pytest.raises(InputError, match="must be finite"):
         TrueTableLab(DT, 1, table={"frequency": math.inf})
 
 
-def test_a_test_of_forty_seconds_takes_a_moment() -> None:
+def test_a_test_of_forty_seconds_is_computed_fast() -> None:
     lab_a, lab_b = TrueColumnLab(DT, 1), TrueTableLab(DT, 1)
     begun = time.perf_counter()
     for value in np.tile(COLUMN, 5).tolist():
@@ -261,7 +261,7 @@ effects = [{{ name = "x.table.pitch", parameters = {{ coupling = 0.1, frequency 
 
 
 @pytest.mark.parametrize("by_file", [True, False])
-def test_a_virtual_run_is_played_in_them(
+def test_a_test_in_virtual_time_runs_with_the_independent_laboratories(
     by_file: bool, monkeypatch: Any, capsys: Any, tmp_path: Path, virtual_recording: Path
 ) -> None:
     place = f"{ROOT}/validation/blind/labs/{{}}.py" if by_file else "validation.blind.labs.{}"
@@ -284,7 +284,7 @@ def test_a_virtual_run_is_played_in_them(
     assert 0.002 < np.std(gap) / np.std(nominal["column_displacement"]) < 0.5
 
 
-def test_a_virtual_run_in_clean_laboratories_has_no_gap(
+def test_a_test_with_clean_independent_laboratories_has_no_gap(
     monkeypatch: Any, tmp_path: Path, virtual_recording: Path
 ) -> None:
     reality, path = tmp_path / "reality.toml", tmp_path / "real.mcap"

@@ -1,4 +1,4 @@
-"""Data loggers of the trial: what each does to a channel, what a relogged recording holds, how its names are judged."""
+"""Data loggers of the trial: their effects on a channel, the relogged recording, and the judgement of its names."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def through(logger: Logger, level: float = 0.0, row: Signal = DISPLACEMENT) -> A
 
 
 @pytest.mark.parametrize("colour", logged.COLOURS)
-def test_every_colour_has_rms_one(colour: str) -> None:
+def test_noise_of_every_colour_has_rms_one(colour: str) -> None:
     rms = [
         np.sqrt(np.mean(logged.COLOURS[colour](np.random.default_rng(seed), 20_000, 500.0) ** 2))
         for seed in range(4)
@@ -41,7 +41,7 @@ def test_every_colour_has_rms_one(colour: str) -> None:
     assert np.mean(rms) == pytest.approx(1.0, abs=0.06)
 
 
-def test_the_colours_are_what_their_names_say() -> None:
+def test_the_coloured_noises_have_the_spectra_of_their_names() -> None:
     def noise(colour: str) -> Array:
         return logged.COLOURS[colour](np.random.default_rng(1), 50_000, 500.0)
 
@@ -58,19 +58,19 @@ def test_the_colours_are_what_their_names_say() -> None:
     assert np.max(np.abs(noise("heavy_tailed"))) > 10.0 > np.max(np.abs(noise("white")))
 
 
-def test_a_filter_delays_slow_signals_by_what_its_order_and_cutoff_say() -> None:
+def test_a_filter_delays_slow_signals_according_to_its_order_and_cutoff() -> None:
     delayed = through(LOGGERS["anti_alias"])
     late = 2.6131 / (2.0 * math.pi * 100.0)  # s, of a Butterworth filter of order 4 at low frequency
     expected = 3e-3 * np.sin(2.0 * math.pi * 1.5 * (TIME - late))
     assert np.max(np.abs(delayed - expected)[500:]) < 2e-6
 
 
-def test_forces_come_late_and_displacements_do_not() -> None:
+def test_loggers_delay_forces_and_not_displacements() -> None:
     assert np.array_equal(through(LOGGERS["late_forces"]), SLOW)
     assert np.array_equal(through(LOGGERS["late_forces"], row=FORCE)[2:], SLOW[:-2])
 
 
-def test_calibration_hum_print_and_converter() -> None:
+def test_calibration_hum_decimals_and_converter_change_a_channel_as_stated() -> None:
     assert np.allclose(through(LOGGERS["calibration"]), 1.01 * SLOW, rtol=1e-12)
     hum = through(LOGGERS["hum"]) - SLOW
     assert np.max(np.abs(hum)) == pytest.approx(3e-5, rel=0.01)
@@ -115,7 +115,7 @@ def test_a_relogged_recording_is_an_import_that_does_not_name_its_logger(tmp_pat
     assert np.std(bends) == pytest.approx(math.sqrt(6.0) * level, rel=0.2)
 
 
-def test_naming_what_the_logger_did_is_no_further_name() -> None:
+def test_naming_an_effect_of_the_logger_does_not_count_as_a_false_name() -> None:
     lagging = "sensor.column_force.lag"
     late = replace(case("catalogue", RUB), logger="late_forces")
     outcome = judged(late, said("explained", lagging, "damper.friction", site="damper"))
@@ -144,7 +144,7 @@ def test_the_table_has_a_row_per_logger_in_their_order() -> None:
     assert rows[1].cells[2:6] == ("1 of 1", "–", "–", "0.00")
 
 
-def test_skill_is_over_the_share_that_was_true() -> None:
+def test_the_brier_skill_is_relative_to_the_share_of_true_cases() -> None:
     assert brier_skill([(1.0, True), (0.0, False)]) == 1.0
     assert brier_skill([(0.5, True), (0.5, False)]) == 0.0
     assert math.isnan(brier_skill([(0.9, True)]))

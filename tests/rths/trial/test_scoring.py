@@ -1,4 +1,4 @@
-"""Scoring: what counts as right, what as wrong and why, and the measures with their goals."""
+"""Scoring: right and wrong verdicts with their reasons, and the measures with their goals."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_the_true_effect_at_its_site_is_right() -> None:
     assert outcome.seconds == 4.0
 
 
-def test_another_effect_is_wrong_and_the_reason_is_told() -> None:
+def test_another_effect_is_wrong_and_the_reason_is_given() -> None:
     outcome = judged(case("catalogue", RUB), said("explained", "column.slip", site="column"), 1.0)
     assert not outcome.right
     assert outcome.surplus
@@ -98,7 +98,7 @@ def test_another_effect_is_wrong_and_the_reason_is_told() -> None:
     )
 
 
-def test_an_effect_that_the_status_denies_is_not_named() -> None:
+def test_an_effect_does_not_count_as_named_if_the_status_denies_it() -> None:
     outcome = judged(case("catalogue", RUB), said("no_gap", "damper.friction", site="damper"))
     assert not outcome.named
     assert outcome.verdict == []
@@ -115,7 +115,7 @@ def test_a_set_of_equivalents_counts_for_effect_and_site() -> None:
     assert not same("a", "b", [{"a", "c"}, {"b", "c"}])
 
 
-def test_both_of_a_pair_must_stand_in_the_verdict() -> None:
+def test_both_effects_of_a_pair_must_be_in_the_verdict() -> None:
     both = said("explained", "damper.friction", "column.slip", site="column")
     assert judged(case("pair", RUB, SLIP), both, 5.0, 3.0).right
     assert judged(case("pair", RUB, SLIP), both, 5.0, 3.0).size == 3.0
@@ -132,13 +132,13 @@ def test_a_clean_laboratory_has_no_gap() -> None:
     assert alarm.why == "reports column.slip, not no_gap"
 
 
-def test_an_effect_inside_the_tolerances_may_be_no_gap() -> None:
+def test_an_effect_within_the_tolerances_may_be_reported_as_no_gap() -> None:
     assert judged(case("catalogue", SOFT, inside=True), said("no_gap")).right
     assert not judged(case("catalogue", SOFT, inside=True), said("no_gap")).visible
     assert not judged(case("catalogue", SOFT), said("no_gap")).right
 
 
-def test_an_unknown_effect_is_said_to_be_unknown_at_its_site() -> None:
+def test_an_unknown_effect_is_right_if_reported_as_unknown_at_its_site() -> None:
     assert judged(case("unknown", CABLE), said("unknown_effect", site="damper")).right
     assert judged(
         case("unknown", CABLE), said("partly_explained", "damper.friction", site="damper", probability=0.3)
@@ -155,7 +155,7 @@ def test_a_diagnosis_that_fails_is_wrong() -> None:
     assert [item.status for item in missing] == ["error"]
 
 
-def test_a_parameter_is_judged_by_its_distance_from_nothing() -> None:
+def test_a_parameter_is_judged_relative_to_its_distance_from_the_null_value() -> None:
     report = said("explained", "column.stiffness", site="column")
     report["which"][0]["parameters"] = {"column.stiffness": {"factor": value(0.91, 0.9, 0.92)}}
     (one,) = judged(case("catalogue", SOFT), report).estimates
@@ -205,13 +205,13 @@ def test_measures_pass_and_fail_against_their_goals() -> None:
     assert table["time per 30 s of test, 95th percentile"].value == 4.0
 
 
-def test_nothing_is_passed_where_there_is_no_case() -> None:
+def test_a_goal_without_cases_is_not_met() -> None:
     assert rate("x", [], lambda _: True, 0.9).passed is None
     assert quantile("x", [], least=0.9).passed is None
     assert all(item.passed is None and not item.verdict for item in measures([]))
 
 
-def test_a_goal_is_missed_only_where_the_cases_show_it() -> None:
+def test_a_goal_is_missed_only_if_the_cases_are_significant() -> None:
     assert quantile("x", [1.0, math.nan, math.nan], least=0.9).verdict == "too few cases to say"
     assert quantile("x", [1.0] + [math.nan] * 20, least=0.9).verdict == "FAIL"
     assert quantile("x", [0.01] + [math.nan] * 20, most=0.9).verdict == "FAIL"
@@ -232,7 +232,7 @@ def test_a_goal_is_missed_only_where_the_cases_show_it() -> None:
     assert calibration_bounds([(0.9, False)] * 50)[0] > 0.5
 
 
-def test_matrices_hold_every_case_but_pairs() -> None:
+def test_confusion_matrices_contain_every_case_except_pairs() -> None:
     matrix = confusion(some())
     assert matrix["damper.friction"] == {"damper.friction": 19}
     assert matrix["column.slip"] == {"unknown": 1}
@@ -242,14 +242,14 @@ def test_matrices_hold_every_case_but_pairs() -> None:
     assert sum(sum(row.values()) for row in confusion_by_site(some()).values()) == 23
 
 
-def test_bins_hold_every_value_once() -> None:
+def test_calibration_bins_contain_every_value_once() -> None:
     bins = binned([(0.0, True), (0.1, False), (1.0, True)], (0.0, 0.1, 0.5, 1.0))
     assert [(item.count, item.share) for item in bins] == [(1, 1.0), (1, 0.0), (1, 1.0)]
     assert sum(item.count for item in by_size(some())) == 21
     assert sum(item.count for item in reliability(some())) == 20
 
 
-def test_results_are_json_and_the_page_stands_alone() -> None:
+def test_results_are_json_and_their_page_loads_nothing_from_elsewhere() -> None:
     text = json.dumps(results(some()), allow_nan=False)
     assert len(json.loads(text)["cases"]) == 24
     shown = page(some(), "Made <here>.")
@@ -264,6 +264,6 @@ def test_results_are_json_and_the_page_stands_alone() -> None:
 
 
 @pytest.mark.slow
-def test_the_page_in_a_browser(tmp_path: Path) -> None:
+def test_the_page_of_the_results_is_drawn_in_a_browser(tmp_path: Path) -> None:
     (tmp_path / "index.html").write_text(page(some(), "Made here."), encoding="utf-8")
     check_in_browser(tmp_path / "index.html", tmp_path)

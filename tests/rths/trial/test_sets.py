@@ -1,4 +1,4 @@
-"""Sets of the trial: how each draws, what is right for a material, what an oracle sees, what is best possible."""
+"""Sets of the trial: the drawing of cases, right names of materials, the oracle, and the best possible score."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_a_laboratory_of_many_faults_has_up_to_nine_mild_ones_each_once() -> Non
             assert one.parameters.get("force", 0.0) <= strong.get(one.name, math.inf)
 
 
-def test_clean_and_pair_cases_have_code_of_their_own() -> None:
+def test_clean_and_pair_cases_of_the_independent_set_use_the_independent_laboratories() -> None:
     for item in (*drawn("independent", 2, "clean"), *drawn("independent", 3, "pair")):
         reality = item.reality()
         labs = {role: reality[role]["rig"]["class"] for role in ("master", "slave")}
@@ -78,7 +78,7 @@ def test_clean_and_pair_cases_have_code_of_their_own() -> None:
         assert realities.from_reality(reality, plan, Path()).seed == item.seed
 
 
-def test_materials_take_turns_and_stand_in_the_columns_place() -> None:
+def test_materials_are_used_in_turn_in_place_of_the_column() -> None:
     count = len(materials.MATERIALS)
     assert count >= 12
     begun = [begin(index, 4, "materials", trial().library) for index in range(count)]
@@ -106,7 +106,7 @@ def served(name: str, way: Any) -> list[float]:
 
 @pytest.mark.skipif(bool(opensees.lacking()), reason=opensees.lacking())
 @pytest.mark.parametrize("name", materials.MATERIALS)
-def test_every_material_answers(name: str) -> None:
+def test_every_material_gives_a_force(name: str) -> None:
     forces = served(name, 3e-3 * np.sin(np.linspace(0.0, 2.0 * math.pi, 401)[1:]))
     assert all(map(math.isfinite, forces))
     assert forces[99] > 0.0 > forces[299]
@@ -122,14 +122,14 @@ def test_a_material_is_named_by_its_mechanism() -> None:
     assert wrong.surplus == 1
 
 
-def test_partly_counts_for_an_unknown_effect_only_without_a_sure_name() -> None:
+def test_partly_explained_counts_for_an_unknown_effect_only_without_a_certain_name() -> None:
     hidden = case("unknown", CABLE)
     assert judged(hidden, said("unknown_effect", site="damper")).right
     assert judged(hidden, said("partly_explained", "damper.friction", site="damper", probability=0.3)).right
     assert not judged(hidden, said("partly_explained", "damper.friction", site="damper")).named
 
 
-def test_of_many_faults_those_that_can_be_seen_are_asked_for() -> None:
+def test_only_the_visible_ones_of_many_effects_have_to_be_named() -> None:
     hidden = case("many", RUB, SOFT)
     found = judged(hidden, said("explained", "damper.friction", site="damper"), 5.0, 0.5)
     assert (found.named, found.asked, found.listed) == (True, 1, 1)
@@ -137,7 +137,7 @@ def test_of_many_faults_those_that_can_be_seen_are_asked_for() -> None:
     assert (found.named, found.asked, found.listed) == (False, 2, 1)
 
 
-def test_the_best_possible_is_what_the_true_laboratory_leaves() -> None:
+def test_the_best_possible_closure_is_that_of_the_true_laboratory() -> None:
     signal = {"nrmse": 0.5, "noise_floor": 0.1, "peak_error": 1.0, "unit": "m"}
     far = {"before": 0.5, "after": 0.1, "closed": 1.0, "closed_interval": None, "noise_floor": 0.1}
     report = bare("explained")
@@ -170,7 +170,7 @@ def test_the_oracle_sees_less_through_a_logger_that_adds_noise_at_the_signals_fr
     )
 
 
-def test_every_set_says_what_it_asks() -> None:
+def test_every_set_states_its_question() -> None:
     assert all(chosen.text for chosen in SETS.values())
     assert set(SETS) == {"judge", "tune", "loggers", "normal", "many", "independent", "materials"}
     assert len(LOGGERS) == 15

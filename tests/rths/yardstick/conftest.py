@@ -17,7 +17,7 @@ from validation.proof import draw_all
 
 
 class Played(NamedTuple):
-    """What the command makes of a few settings, plants and delays."""
+    """The results of the command for a few settings, plants and delays."""
 
     evidence: BenchmarkEvidence
     checks: list[evidence.GoalCheck]

@@ -28,7 +28,7 @@ from validation.benchmark2020.problem import CASES, EL_CENTRO, SETTINGS, planned
         (("--plan", "1", "-o", "no/such.toml"), "There is no folder no for"),
     ],
 )
-def test_a_wrong_word_is_said_in_one_sentence(
+def test_a_wrong_argument_of_the_benchmark_gives_one_sentence(
     call: Callable[..., int],
     capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
@@ -44,7 +44,7 @@ def test_a_wrong_word_is_said_in_one_sentence(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_plan_is_written_and_is_that_of_the_comparison(
+def test_the_written_plan_is_that_of_the_comparison(
     call: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     place = tmp_path / "case.toml"

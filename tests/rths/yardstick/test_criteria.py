@@ -18,7 +18,7 @@ def wave(shift: float = 0.0, frequency: float = 3.0) -> Array:
     )
 
 
-def test_every_criterion_is_the_share_it_says() -> None:
+def test_every_criterion_is_the_ratio_of_its_definition() -> None:
     rng = np.random.default_rng(5)
     target, measured = rng.normal(size=500), rng.normal(size=500) + 0.3
     floors, reference = rng.normal(size=(500, 3)), rng.normal(size=(500, 3)) * (1.0, 2.0, 3.0)
@@ -45,7 +45,7 @@ def test_every_criterion_is_the_share_it_says() -> None:
     assert found == pytest.approx(wanted)
 
 
-def test_there_is_a_meaning_for_each() -> None:
+def test_every_criterion_has_a_description() -> None:
     assert [name.lower() for name in MEANINGS] == list(Criteria._fields)
 
 

@@ -37,7 +37,7 @@ def test_every_kind_of_the_registry_is_compared() -> None:
     assert {setting.kind for setting in SETTINGS.values()} == set(COMPENSATORS)
 
 
-def test_plants_spread_as_published_and_are_the_same_for_a_seed() -> None:
+def test_plants_scatter_as_published_and_depend_on_the_seed_only() -> None:
     plan = planned(CASES[0], EL_CENTRO)
     plants = np.array(draw(plan, 2000, 7))
     assert plants.mean(axis=0) == pytest.approx([3.3, 425.0, 9.9976e4, 1.19e6], rel=0.03)
@@ -47,7 +47,7 @@ def test_plants_spread_as_published_and_are_the_same_for_a_seed() -> None:
     assert draw(plan, 5, 7) != draw(plan, 5, 8)
 
 
-def test_another_plant_leaves_the_whole_building_as_it_is() -> None:
+def test_another_plant_does_not_change_the_whole_building() -> None:
     plan = planned(CASES[2], EL_CENTRO)
     other = with_plant(plan, draw(plan, 1, 3)[0])
     assert other.column.stiffness != plan.column.stiffness
@@ -55,7 +55,7 @@ def test_another_plant_leaves_the_whole_building_as_it_is() -> None:
         assert np.array_equal(ours, theirs)
 
 
-def test_a_setting_leaves_what_is_done_to_the_force() -> None:
+def test_a_setting_does_not_change_the_force_correction() -> None:
     plan = planned(CASES[0], EL_CENTRO)
     assert with_compensator(plan, SETTINGS["amb"]).compensator.force == plan.compensator.force
     assert plan.compensator.force.unit_delay

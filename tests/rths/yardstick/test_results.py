@@ -18,26 +18,26 @@ if TYPE_CHECKING:
 
 
 @pytest.mark.parametrize("case", sorted(TABLE_3))
-def test_the_sample_controller_meets_table_3(played: Played, case: int) -> None:
+def test_the_sample_controllers_criteria_agree_with_table_3(played: Played, case: int) -> None:
     found = on_el_centro(played.evidence.results, "sample")[case - 1].found
     assert found is not None
     assert found.j1 == pytest.approx(TABLE_3[case].j1, abs=0.3e-3)
     assert found[1:] == pytest.approx(TABLE_3[case][1:], abs=0.01)
 
 
-def test_j2_holds_the_noise_of_the_sensor(played: Played) -> None:
+def test_j2_includes_the_noise_of_the_sensor(played: Played) -> None:
     for item in on_el_centro(played.evidence.results, "amb"):
         assert item.found is not None
         assert 0.01 < item.noise_floor < item.found.j2
 
 
-def test_critical_delays_by_search_and_equation_are_the_published_ones(played: Played) -> None:
+def test_critical_delays_by_search_and_equation_agree_with_the_published_ones(played: Played) -> None:
     for item in played.evidence.critical:
         assert item.searched == pytest.approx(CRITICAL_DELAYS[item.case], rel=0.002)
         assert item.equation == pytest.approx(CRITICAL_DELAYS[item.case], rel=0.002)
 
 
-def test_a_late_force_is_seen_by_its_own_indicator_only(played: Played) -> None:
+def test_a_delayed_force_changes_only_its_own_indicator(played: Played) -> None:
     for item in played.evidence.late:
         if item.path is None or item.delay > 3e-3:
             continue
@@ -73,7 +73,7 @@ def test_the_goals_are_all_judged_and_met(played: Played) -> None:
     assert played.json["checks"][0]["value"] == "36 of 36"
 
 
-def test_of_all_settings_one_at_least_must_reach_the_goals(played: Played) -> None:
+def test_at_least_one_setting_must_reach_the_goals(played: Played) -> None:
     assert compensator_check(played.evidence.summaries).passed
     assert compensator_check(played.evidence.summaries).value == "amb, ats"
     others = [item for item in played.evidence.summaries if not item.meets]
@@ -89,7 +89,7 @@ def test_of_all_settings_one_at_least_must_reach_the_goals(played: Played) -> No
         assert not compensator_check([amb._replace(**worse)]).passed
 
 
-def test_json_has_every_test_with_its_criteria(played: Played) -> None:
+def test_the_json_contains_every_test_with_its_criteria(played: Played) -> None:
     tests = played.json["tests"]
     assert len(tests) == len(played.evidence.results)
     for test in tests:
