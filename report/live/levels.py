@@ -45,19 +45,26 @@ class Levels:
             if name in NOT_LIMITED or values.dtype.kind != "f" or not values.size:
                 continue
             sizes = np.abs(values).reshape(values.shape[0], -1)
-            top, now = float(np.nanmax(sizes, initial=0.0)), float(np.nanmax(sizes[-1], initial=0.0))
-            key = role, name
-            tops = self._tops.setdefault(key, deque())
-            tops.append((t, top))
-            while tops[0][0] < t - LATELY_S:
-                tops.popleft()
-            most = max(top, self._found[key].most if key in self._found else 0.0)
-            self._found[key] = Level(now, max(each for _, each in tops), most, t)
-            self.units[key] = units.get(name, "")
+            self.units[role, name] = units.get(name, "")
+            self._add((role, name), t, sizes, columns["t"] > t - LATELY_S)
+
+    def _add(self, key: tuple[str, str], t: float, sizes: Values, late: Values) -> None:
+        """Take in the magnitudes (ticks, n) of a value up to a time; `late` (ticks,) tells those of the last time."""
+        tops = self._tops.setdefault(key, deque())
+        tops.append((t, largest(sizes[late])))
+        while tops[0][0] < t - LATELY_S:
+            tops.popleft()
+        most = max(largest(sizes), self._found[key].most if key in self._found else 0.0)
+        self._found[key] = Level(largest(sizes[-1]), max(each for _, each in tops), most, t)
 
     def of(self, role: str, name: str) -> Level | None:
         """The level of a value, None before the first."""
         return self._found.get((role, name))
+
+
+def largest(sizes: Values) -> float:
+    """The largest of some magnitudes, 0 of none."""
+    return float(np.nanmax(sizes, initial=0.0))
 
 
 def limits(plan: Plan, lab: LaboratoryFacts) -> dict[str, float]:

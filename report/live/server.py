@@ -53,6 +53,7 @@ class Server:
         logging.getLogger("bokeh").setLevel(
             logging.ERROR
         )  # bokeh would warn of every reader who closes the page
+        logging.getLogger("tornado.access").setLevel(logging.ERROR)  # and tornado of every request refused
         self._period = 1e3 / rate
         try:
             sockets, self._port = bind_sockets(host, port)

@@ -1,0 +1,217 @@
+"""What a page of the panel is told: states, causes, bars, and how old each of them is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common.host.clock import VirtualClock
+from common.plan.plan import Plan
+from common.plan.read import load
+from common.reality import reality
+from common.recording.reader import Tail
+from common.terminal.cli import plan_path
+from report.live.feed import Feed
+from report.panel.desk import Desk, Outcome, Present, Request
+from report.panel.snapshot import Looked, Shown, Snapshot, Told
+from report.panel.view import View
+from simulation import virtual
+from tests.helpers import with_table
+
+SECOND = 1_000_000_000
+
+
+class Idle:
+    """Hands that never finish."""
+
+    present = Present("a-1", "d", "d")
+
+    def carry_out(self, word: str, digest: str, reason: str) -> Future[Outcome]:
+        del word, digest, reason
+        return Future()
+
+
+class Watched:
+    """The view of a test whose recording grows."""
+
+    def __init__(self, path: Path, content: bytes, plan: Plan) -> None:
+        self.clock = VirtualClock()
+        self.clock.time = 100 * SECOND
+        self.path, self._content = path, content
+        self.tail = Tail(path)
+        self.feed = Feed(self.tail, 10.0, self.clock)
+        self.desk = Desk(Idle(), self.clock)
+        self.page = self.desk.enter()
+        self.view = View(self.desk, self.clock)
+        self.shown: Shown | None = Shown("a-1", "a", plan, plan.digest(), path, own=True, reached=True)
+
+    def to(self, share: float) -> None:
+        """Let a share of the recording be there."""
+        self.path.write_bytes(self._content[: round(share * len(self._content))])
+        self.feed.look()
+        while self.feed.behind:
+            self.feed.look()
+
+    def tell(self, alive: tuple[str, ...] = ("master", "slave"), **modes: str) -> None:
+        """Let the test's command report modes now, and which processes run."""
+        now = self.clock.time
+        assert self.shown is not None
+        before = dict(self.shown.told.modes)
+        told = Told(before | {lab: (mode, now) for lab, mode in modes.items()}, alive, now)
+        self.shown = self.shown._replace(told=told)
+
+    def state(self, **more: Any) -> dict[str, Any]:
+        found = self.view.state(Snapshot("plan.toml", self.shown, **more), self.feed, self.page)
+        json.dumps(found, allow_nan=False)  # a browser reads it
+        return found
+
+    def labs(self) -> dict[str, tuple[str, float]]:
+        return {lab["role"]: (lab["mode"], round(lab["age"], 2)) for lab in self.state()["labs"]}
+
+
+@pytest.fixture
+def watched(tmp_path: Path, virtual_recording: Path, short_plan: Plan) -> Iterator[Watched]:
+    found = Watched(tmp_path / "a.mcap", virtual_recording.read_bytes(), short_plan)
+    with found.tail:
+        yield found
+
+
+def test_without_a_test_nothing_is_shown_of_one(watched: Watched) -> None:
+    watched.shown = None
+    state = watched.state()
+    assert state["test"] is None
+    assert (state["labs"], state["bars"], state["causes"]) == ([], [], [])
+    assert state["phase"] == "No test runs"
+    assert state["page"] == 1
+    assert watched.view.state(Snapshot("p"), watched.feed, "somebody")["page"] == 0
+
+
+def test_an_armed_laboratorys_age_is_that_of_its_process_and_grows_with_silence(watched: Watched) -> None:
+    watched.tell(master="armed", slave="armed")
+    watched.clock.time += SECOND // 2
+    assert watched.labs() == {"master": ("armed", 0.5), "slave": ("armed", 0.5)}
+    assert watched.state()["phase"] == "armed"
+    watched.clock.time += 30 * SECOND
+    assert watched.labs()["slave"] == ("armed", 30.5)
+
+
+def test_a_moving_laboratorys_age_is_that_of_its_rows_though_its_process_is_there(watched: Watched) -> None:
+    watched.tell(master="running", slave="running")
+    assert watched.labs()["master"] == ("running", 0.0)  # no row has come yet
+    watched.to(0.5)
+    assert watched.labs()["master"] == ("running", 0.0)
+    watched.clock.time += 5 * SECOND
+    watched.tell()
+    for mode, age in watched.labs().values():
+        assert mode == "running"
+        assert age == pytest.approx(5.0, abs=0.1)  # the two streams do not reach equally far
+    assert all(4.9 < bar["age"] < 5.2 for bar in watched.state()["bars"])
+
+
+def test_a_process_that_has_gone_is_said_and_one_that_has_left_in_order_too(watched: Watched) -> None:
+    watched.tell(master="running", slave="running")
+    watched.clock.time += SECOND
+    watched.tell(alive=("master",), master="ramping")
+    state = watched.state()
+    assert state["phase"] == "a laboratory has no process"
+    gone = state["labs"][1]
+    assert (gone["mode"], gone["note"], gone["loud"]) == ("no process", "it was running", "bad")
+    watched.tell(alive=(), master="idle", slave="idle")
+    watched.clock.time += SECOND
+    watched.tell(alive=())
+    assert [lab["mode"] for lab in watched.state()["labs"]] == ["left", "left"]
+
+
+def test_a_test_that_was_started_elsewhere_is_known_by_its_recording_alone(watched: Watched) -> None:
+    assert watched.shown is not None
+    watched.shown = watched.shown._replace(own=False)
+    state = watched.state()
+    assert [(lab["mode"], lab["age"]) for lab in state["labs"]] == [("not known", None)] * 2
+    watched.to(0.5)
+    assert {mode for mode, _ in watched.labs().values()} == {"running"}
+
+
+def test_bars_stand_beside_the_limits_that_the_plan_writes(watched: Watched) -> None:
+    watched.to(0.6)
+    bars = {bar["name"]: bar for bar in watched.state()["bars"]}
+    assert set(bars) >= {"displacement", "column force", "table displacement", "damper stroke"}
+    force = bars["column force"]
+    assert force["limit"] == "400 kN"
+    assert 0.0 < force["share"] <= force["most"] < 0.1
+    top = watched.feed.levels.of("master", "column_force")
+    assert top is not None
+    assert force["most"] == pytest.approx(top.most / 400e3)
+    watched.to(1.0)
+    assert {bar["age"] for bar in watched.state()["bars"]} == {None}
+
+
+def test_the_largest_of_the_last_second_follows_a_motion_that_fades(watched: Watched) -> None:
+    watched.to(1.0)
+    stroke = watched.feed.levels.of("slave", "damper_stroke")
+    assert stroke is not None
+    assert stroke.now <= stroke.lately <= stroke.most
+    assert stroke.lately < stroke.most
+
+
+def test_causes_and_latched_laboratories_are_told(tmp_path: Path, short_plan: Plan) -> None:
+    plan = with_table(short_plan, "limits", column_force=12e3)
+    made = tmp_path / "made.mcap"
+    virtual.run(virtual.assemble(plan, reality.as_planned(plan), made), str)
+    watched = Watched(tmp_path / "a.mcap", made.read_bytes(), plan)
+    with watched.tail:
+        watched.to(0.98)
+        watched.tell(master="safe", slave="safe")
+        state = watched.state()
+        assert "column_force" in state["causes"][0]["text"]
+        assert state["causes"][0]["lab"] == "master"
+        assert [(lab["mode"], lab["note"]) for lab in state["labs"]] == [("safe", "latched until Reset")] * 2
+        watched.shown = None
+        watched.to(1.0)
+        assert state["phase"] == "safe"
+        assert "column_force" in watched.state()["phase"]
+
+
+def test_before_anything_is_recorded_the_causes_are_those_that_were_reported(watched: Watched) -> None:
+    assert watched.shown is not None
+    watched.shown = watched.shown._replace(told=Told(causes=(("slave", "The door is open."),)))
+    assert watched.state()["causes"] == [{"lab": "slave", "t": "", "text": "The door is open."}]
+
+
+def test_plan_and_machine_are_shown_as_their_commands_say_it(watched: Watched) -> None:
+    from report.plan.facts import facts
+
+    plan = plan_path(None)
+    found = facts(load(plan), plan)
+    failed = {"name": "priority", "found": "none", "needed": "49", "advice": "Grant it.", "passed": False}
+    machine = {"checks": [failed, failed | {"passed": True}], "verdict": {"sentence": "It lacks one thing."}}
+    watched.clock.time += SECOND
+    looked = {"plan": Looked(found, at=99 * SECOND), "machine": Looked(machine, at=100 * SECOND)}
+    state = watched.state(**looked)
+    assert state["plan"]["digest"] == load(plan).digest()
+    assert state["plan"]["ready"]
+    assert state["plan"]["age"] == pytest.approx(2.0)
+    assert dict(state["plan"]["facts"])["ground motion"].startswith("El Centro 1940 NS")
+    assert any("Pre-flight would let this test begin" in text for text in state["plan"]["concerns"])
+    assert next(one for one in state["plan"]["peaks"] if one["name"] == "column force")["share"] < 0.2
+    assert state["machine"]["lacks"] == [
+        {name: failed[name] for name in ("name", "found", "needed", "advice")}
+    ]
+    assert state["machine"]["verdict"] == "It lacks one thing."
+    busy = watched.state(plan=Looked(at=SECOND, busy=True))["plan"]
+    assert (busy["busy"], busy["digest"]) == (True, "")
+
+
+def test_orders_are_listed_with_the_number_of_the_page_that_sees_its_own(watched: Watched) -> None:
+    watched.desk.take(Request(watched.page, 1, "stop", "a-1", seen=watched.clock.time // 1_000_000))
+    other = watched.desk.enter()
+    mine, theirs = (
+        watched.view.state(Snapshot("p", watched.shown), watched.feed, page)["orders"][0]
+        for page in (watched.page, other)
+    )
+    assert (mine["number"], theirs["number"]) == (1, 0)
+    assert (mine["page"], mine["word"], mine["state"]) == (1, "Stop", "sent")
