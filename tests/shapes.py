@@ -34,5 +34,5 @@ def plan_of(shape: str, **given: dict[str, Any]) -> Plan:
 
 
 def merged(tables: dict[str, Any], given: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """The tables with the values given in place of their own."""
+    """The tables, with given values in place of their own."""
     return tables | {name: tables.get(name, {}) | values for name, values in given.items()}

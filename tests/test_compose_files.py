@@ -1,4 +1,4 @@
-"""The compose files, as far as they can be judged without an engine."""
+"""The compose files, as far as they can be checked without a container engine."""
 
 from __future__ import annotations
 

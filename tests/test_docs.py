@@ -45,7 +45,7 @@ BY_CONSTANT = {
 
 
 @pytest.mark.parametrize("name", generate.parts())
-def test_a_document_has_what_the_code_generates(name: str) -> None:
+def test_a_generated_document_equals_what_the_code_generates(name: str) -> None:
     text = (generate.FOLDER / name).read_text(encoding="utf-8")
     assert generate.renewed(text, generate.parts()[name]) == text, "run `make docs`"
 
@@ -55,7 +55,7 @@ def test_a_part_without_a_place_is_refused() -> None:
         generate.renewed("<!-- modes -->\n", {"modes": ""})
 
 
-def test_the_picture_of_the_safety_machine_has_every_mode_and_turn() -> None:
+def test_the_picture_of_the_safety_machine_has_every_mode_and_transition() -> None:
     drawn = (generate.FOLDER / "pictures/modes.svg").read_text(encoding="utf-8")
     shown = {text for words in re.findall(r">([^<>]+)</text>", drawn) for text in re.split(r" / |: ", words)}
     turns = {turn.value for row in TURNS.values() for turn in row}
@@ -65,7 +65,7 @@ def test_the_picture_of_the_safety_machine_has_every_mode_and_turn() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_limit_is_checked_by_the_laboratories_that_the_table_says(name: str) -> None:
+def test_every_limit_is_checked_by_the_laboratories_named_in_the_table(name: str) -> None:
     checked = {"A": master_trips(name), "B": slave_trips(name)}
     assert {lab for lab, trips in checked.items() if trips} == {
         lab for lab, names in generate.CHECKED_BY.items() if name in names
@@ -73,7 +73,7 @@ def test_a_limit_is_checked_by_the_laboratories_that_the_table_says(name: str) -
 
 
 def only(name: str) -> Plan:
-    """A plan with one limit, and that next to nothing."""
+    """A plan with one limit, which is close to zero."""
     most = dict.fromkeys(NAMES, math.inf) | {"displacement": 0.15, name: 1e-12}
     return Plan(limits=Limits(**most))
 
@@ -106,7 +106,7 @@ def slave_trips(name: str) -> bool:
     return False
 
 
-def test_the_bound_of_motion_is_that_of_the_fault_matrix_and_a_little_for_the_jerk() -> None:
+def test_the_documented_bound_of_motion_is_that_of_the_fault_matrix_plus_a_margin_for_the_jerk() -> None:
     rows = [line.split("|")[1:-1] for line in generate.motion(Plan()).splitlines()[2:]]
     for role, row in zip(("master", "slave"), rows, strict=True):
         through, halt, jerk, together = (float(cell.split()[0]) * 1e-3 for cell in row[2:])
@@ -149,13 +149,13 @@ def codes(node: ast.AST) -> list[str]:
     ]
 
 
-def test_the_plan_that_documents_the_keys_is_the_default_plan() -> None:
+def test_the_plan_that_documents_the_keys_equals_the_default_plan() -> None:
     from common.plan.read import load
 
     assert strict(load(ROOT / "rths/plans/default.toml")).digest() == Plan().digest()
 
 
-def test_the_table_of_verbs_has_every_event_of_the_protocol_and_every_turn_of_the_safety_machine() -> None:
+def test_the_table_of_verbs_has_every_event_of_the_protocol_and_every_safety_transition() -> None:
     page = (generate.FOLDER / "reference" / "words.md").read_text(encoding="utf-8")
     shown = set(re.findall(r"^\| ([a-z]+)", page[page.index("## The verbs") :], flags=re.MULTILINE))
     named = {"secured": "secure", "settled": "settle"}  # a verb's table says what is done, a turn that it was

@@ -1,4 +1,4 @@
-"""What keeps a run of the tests from hanging, and from leaving processes behind that disturb the next."""
+"""The measures that keep a test run from hanging and from leaving processes behind."""
 
 from __future__ import annotations
 
@@ -61,14 +61,14 @@ def number_in(path: Path) -> int:
 
 
 @pytest.mark.parametrize(("command", "code"), [("exit 0", 0), ("exit 3", 3), ("kill -9 $$", 128 + 9)])
-def test_the_exit_code_is_the_commands(command: str, code: int) -> None:
+def test_the_exit_code_of_the_limiter_is_the_commands(command: str, code: int) -> None:
     done = finished(*LIMITED, "it", "30", "bash", "-c", command, seconds=60.0)
     assert (done.returncode, done.stderr) == (code, "")
 
 
 @pytest.mark.slow
 @LINUX
-def test_a_command_that_takes_too_long_is_ended_with_all_that_it_started(tmp_path: Path) -> None:
+def test_a_command_that_takes_too_long_is_ended_with_its_child_processes(tmp_path: Path) -> None:
     script = (
         f'"{sys.executable}" -c "{ELSEWHERE}" number & until test -s number; do sleep 0.1; done; sleep 60'
     )
@@ -79,7 +79,7 @@ def test_a_command_that_takes_too_long_is_ended_with_all_that_it_started(tmp_pat
 
 
 @LINUX
-def test_what_a_command_leaves_is_named_and_killed(tmp_path: Path) -> None:
+def test_processes_that_a_command_leaves_are_named_and_killed(tmp_path: Path) -> None:
     script = f'"{sys.executable}" -c "{ELSEWHERE}" number & until test -s number; do sleep 0.1; done'
     done = finished(*LIMITED, "tests", "30", "bash", "-c", script, seconds=60.0, cwd=tmp_path)
     left = number_in(tmp_path / "number")
@@ -90,7 +90,7 @@ def test_what_a_command_leaves_is_named_and_killed(tmp_path: Path) -> None:
 
 @LINUX
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-def test_nothing_outlives_who_limits_it(number: int, tmp_path: Path) -> None:
+def test_no_process_outlives_its_limiter(number: int, tmp_path: Path) -> None:
     program = "import os, time; open('number', 'w').write(str(os.getpid())); time.sleep(60)"
     with subprocess.Popen([*LIMITED, "it", "50", sys.executable, "-c", program], cwd=tmp_path) as limiting:
         pid = number_in(tmp_path / "number")
@@ -124,7 +124,7 @@ def test_a_test_that_hangs_fails_with_its_stacks_and_the_others_go_on(tmp_path: 
 
 
 @LINUX
-def test_what_a_test_starts_is_killed_with_its_interpreter(tmp_path: Path) -> None:
+def test_processes_that_a_test_starts_are_killed_with_its_interpreter(tmp_path: Path) -> None:
     program = (
         "import subprocess, sys, time; from tests.processes import tied\n"
         f"child = subprocess.Popen(tied(sys.executable, '-c', {ELSEWHERE!r}, 'number')); time.sleep(60)"

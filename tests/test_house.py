@@ -34,14 +34,14 @@ def test_the_readme_names_commands_and_files_that_exist() -> None:
             assert (ROOT / folder).is_dir(), folder
 
 
-def test_the_readme_says_what_each_folder_holds() -> None:
+def test_the_readme_describes_each_folder() -> None:
     folders = {path.relative_to(ROOT).parts[0] for path in tracked() if path.parent != ROOT}
     rows = re.findall(r"^\| (`.+?/`) \|", README, flags=re.MULTILINE)
     named = {folder for row in rows for folder in re.findall(r"`(.+?)/`", row)}
     assert named == {folder for folder in folders if not folder.startswith(".")}
 
 
-def test_the_readmes_first_screen_is_the_two_commands_and_the_output_of_the_first() -> None:
+def test_the_readme_begins_with_the_two_commands_and_the_output_of_the_first() -> None:
     head = README[: README.index("## The loop")]
     assert "make run" in head
     assert "make test" in head
@@ -49,7 +49,7 @@ def test_the_readmes_first_screen_is_the_two_commands_and_the_output_of_the_firs
     assert "outcome: completed" in head
 
 
-def test_the_readme_is_read_in_a_few_minutes() -> None:
+def test_the_readme_has_at_most_900_words() -> None:
     assert len(README.split()) <= 900
 
 
@@ -71,11 +71,11 @@ def test_the_lock_pins_every_dependency_with_a_hash() -> None:
     assert lock.count("--hash=sha256:") > lock.count("==")
 
 
-def test_the_front_door_is_at_home() -> None:
+def test_the_command_runs_with_its_own_packages() -> None:
     assert check_home() == ""
 
 
-def test_another_common_in_the_way_is_said_in_one_sentence(tmp_path: Path) -> None:
+def test_another_package_named_common_on_the_path_is_reported_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "common").mkdir()
     for file in (ROOT / "common").glob("*.py"):
         (tmp_path / "common" / file.name).write_text(file.read_text())

@@ -22,7 +22,7 @@ def free_port() -> int:
 
 
 class Element:
-    """What a `genericClient` element of OpenSees does with its socket."""
+    """The socket protocol of a `genericClient` element of OpenSees."""
 
     def __init__(self, port: int, header: ClientHeader | None = None) -> None:
         self.header = header or wire.element(1)
@@ -101,7 +101,7 @@ class Script(threading.Thread):
         self.start()
 
     def run(self) -> None:
-        """Do it."""
+        """Connect and run the script."""
         try:
             self._work()
         except BaseException as error:

@@ -1,4 +1,4 @@
-"""A served test in virtual time, with the real drive, loops and recorder, and a client that comes through a socket."""
+"""A served test in virtual time with the real drive, loops and recorder, and a client that connects by socket."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Served(NamedTuple):
         return [event["text"] for event in self.run.events if event["code"] == code]
 
     def warned(self) -> list[str]:
-        """What is said of clients that were turned away."""
+        """The warnings about clients that were turned away."""
         found = (event for event in self.run.events if event["code"] == "client")
         return [event["text"] for event in found if event["level"] == "warning"]
 

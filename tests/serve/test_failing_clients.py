@@ -184,7 +184,7 @@ CASES: list[tuple[Callable[[int], None], int, str]] = [
 
 
 @pytest.mark.parametrize(("script", "code", "says"), CASES, ids=[case[0].__name__ for case in CASES])
-def test_a_client_that_fails_leaves_the_laboratory_safe_and_the_recording_whole(
+def test_after_a_client_fails_the_laboratory_is_safe_and_the_recording_complete(
     script: Callable[[int], None], code: int, says: str, tmp_path: Path
 ) -> None:
     served = serve(script, tmp_path, pace=Ticking())
@@ -203,7 +203,7 @@ def test_a_client_that_fails_leaves_the_laboratory_safe_and_the_recording_whole(
 
 
 def safe_after(served: Served) -> float:
-    """From the last force that the client was handed to the begin of the ramp to rest, s."""
+    """The time from the last force that the client received to the beginning of the ramp to rest, s."""
     of, interval = served.run.columns["master"], 0.002
     handed = np.flatnonzero(np.isfinite(of["client_force"]))
     (ramp,) = [
@@ -213,7 +213,7 @@ def safe_after(served: Served) -> float:
 
 
 def whole(served: Served) -> None:
-    """Every tick is recorded, and the ramp to rest with its end."""
+    """Asserts that every tick and the ramp to rest with its end are recorded."""
     run = served.run
     count = len(run.columns["master"]["seq"])
     assert count >= STEPS
@@ -255,7 +255,7 @@ def test_a_second_client_is_turned_away_and_the_first_goes_on(tmp_path: Path) ->
     )
 
 
-def test_a_flood_of_clients_is_turned_away_and_told_of_ten_times(tmp_path: Path) -> None:
+def test_a_flood_of_clients_is_turned_away_and_reported_at_most_ten_times(tmp_path: Path) -> None:
     def many(port: int) -> None:
         client = begun(port)
         others = [socket.create_connection((HOST, port), timeout=PATIENCE_S) for _ in range(7)]
@@ -339,7 +339,7 @@ def ends(port: int) -> None:
         return
 
 
-def test_openfresco_is_served_by_the_same_port(tmp_path: Path) -> None:
+def test_openfresco_is_served_at_the_same_port(tmp_path: Path) -> None:
     """GenericTCP: the first exchange at zero, a pause for its operator, then 3 and 6 a step, and never a commit."""
     found = []
 

@@ -1,4 +1,4 @@
-"""Laboratories of other kinds, and rigs of a user's, behind an element of a client."""
+"""Laboratories of other kinds and users' rigs, served as elements of a client."""
 
 from __future__ import annotations
 
@@ -75,14 +75,14 @@ def pushes(plan: Plan, places: Any, forces: Any, columns: dict[str, Any]) -> Non
     assert np.array_equal(forces, -plan.damper.force_scale * of["damper_force"][:STEPS])
 
 
-def test_a_table_with_its_motor_stands_behind_an_element(tmp_path: Path) -> None:
+def test_a_table_with_its_motor_is_served_as_an_element(tmp_path: Path) -> None:
     plan = parse(QUIET + '[master]\nkind = "none"\n', tmp_path)
     places, forces, columns = swayed(tmp_path, plan)
     pushes(plan, places, forces[:, 0], columns)
     assert np.max(np.abs(forces)) > 100.0
 
 
-def test_a_column_and_a_table_stand_behind_one_element(tmp_path: Path) -> None:
+def test_a_column_and_a_table_are_served_as_one_element(tmp_path: Path) -> None:
     plan = parse(QUIET, tmp_path)
     places, forces, columns = swayed(tmp_path, plan, 2)
     assert forces[:, 0] == pytest.approx(6.25e6 * places, rel=1e-12)
@@ -90,7 +90,7 @@ def test_a_column_and_a_table_stand_behind_one_element(tmp_path: Path) -> None:
     assert np.max(np.abs(forces[:, 1])) > 100.0
 
 
-def test_a_rig_of_the_users_own_stands_behind_an_element(tmp_path: Path) -> None:
+def test_a_users_rig_is_served_as_an_element(tmp_path: Path) -> None:
     (tmp_path / "lab.py").write_text(RIG)
     rig = '[master.rig]\nclass = "lab.py:Rig"\noptions = { stiffness = 9e6 }\n'
     places, forces, columns = swayed(tmp_path, parse(IDEAL + ALONE + rig, tmp_path))

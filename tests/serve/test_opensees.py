@@ -1,4 +1,4 @@
-"""OpenSees itself, in another process, with laboratories as its elements, beside its own springs."""
+"""OpenSees in another process with laboratories as its elements, compared with its own springs."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def same(found: Any, expected: Any) -> None:
 
 
 @pytest.mark.parametrize("integrator", [*EXPLICIT, "Newmark"])
-def test_a_laboratory_is_the_spring_that_it_stands_for(integrator: str, tmp_path: Path) -> None:
+def test_a_served_laboratory_equals_the_spring_that_it_represents(integrator: str, tmp_path: Path) -> None:
     error, found, run = served(tmp_path, plan_of(), integrator)
     assert error is None
     same(found, springs(integrator))
@@ -98,8 +98,10 @@ def test_a_laboratory_is_the_spring_that_it_stands_for(integrator: str, tmp_path
 
 @pytest.mark.parametrize("elements", [1, 2])
 @pytest.mark.parametrize("integrator", EXPLICIT)
-def test_two_laboratories_are_one_element_or_two(integrator: str, elements: int, tmp_path: Path) -> None:
-    """Over two intervals each, so that the slave's force belongs to its displacement."""
+def test_two_laboratories_are_served_as_one_element_or_as_two(
+    integrator: str, elements: int, tmp_path: Path
+) -> None:
+    """Each step lasts two intervals, so that the slave's force belongs to its displacement."""
     plan = with_test(plan_of(TWICE), intervals=2)
     error, found, run = served(tmp_path, plan, integrator, elements=elements)
     assert error is None
@@ -137,7 +139,7 @@ def test_newton_on_linear_laboratories_imposes_each_displacement_once(tmp_path: 
     same(found, springs("Newmark", algorithm="Newton"))
 
 
-def test_newton_on_a_specimen_that_yields_is_refused_with_integrators_that_fit(tmp_path: Path) -> None:
+def test_newton_on_a_yielding_specimen_is_refused_and_suitable_integrators_are_named(tmp_path: Path) -> None:
     error, _, run = served(tmp_path, plan_of(YIELDING), "Newmark", "Newton")
     assert isinstance(error, InterlockError)
     assert "NewmarkExplicit, CentralDifference or AlphaOS" in str(error)

@@ -47,7 +47,7 @@ def test_a_test_in_real_time_ends_with_its_client(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_client_that_is_killed_in_real_time_is_said_in_one_sentence(tmp_path: Path) -> None:
+def test_a_client_that_is_killed_in_real_time_is_reported_in_one_sentence(tmp_path: Path) -> None:
     server, client = started(tmp_path, 100_000)
     with server, client:
         assert server.stderr is not None

@@ -1,4 +1,4 @@
-"""Predictions: draws follow the spread, bands hold as often as they should, bad files end in one sentence."""
+"""Predictions: draws follow the spread, bands cover as often as stated, bad files are refused in one sentence."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def short(duration: float = 3.0, **test: Any) -> Plan:
 
 
 def tables(plan: Plan, **more: Any) -> dict[str, Any]:
-    """What a diagnosis found in a plan's laboratories."""
+    """The laboratories that a diagnosis found, as the tables of a reality."""
     origin = {"models": models_of(plan), "building": building_of(plan), "rest": "found.npz"}
     friction = {"name": "damper.friction", "laboratory": "slave", "force": 3.0}
     return {"found": origin, "effect": [friction]} | more
@@ -65,7 +65,7 @@ def written(folder: Path, plan: Plan, spread: Spread = SPREAD, **more: Any) -> P
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with what was found."""
+    """A folder with the laboratories that were found."""
     result = tmp_path_factory.mktemp("predicted")
     written(result, short())
     return result
@@ -99,7 +99,7 @@ def test_a_prediction_is_the_same_every_time(folder: Path, found: Prediction) ->
     assert bands.plain(again) == bands.plain(found)
 
 
-def test_the_band_of_laboratories_drawn_holds_others_of_the_same_kind(
+def test_the_band_of_drawn_laboratories_covers_others_of_the_same_distribution(
     folder: Path, found: Prediction
 ) -> None:
     plan = short(scale=0.2)
@@ -115,25 +115,25 @@ def test_the_band_of_laboratories_drawn_holds_others_of_the_same_kind(
     assert 0.85 < np.mean(shares) <= 1.0  # with the share that is left the band is wider than that of these
 
 
-def test_a_test_that_leaves_what_was_seen_is_said(found: Prediction) -> None:
+def test_a_test_beyond_the_diagnosed_range_is_reported(found: Prediction) -> None:
     assert any("column_displacement reaches" in sentence for sentence in found.sentences)
     assert found.reaches[MASTER].ratio > 1.1 > found.reaches["slave"].ratio
 
 
-def test_what_is_left_grows_with_the_amplitude_beyond_what_was_seen() -> None:
+def test_the_model_error_grows_with_the_amplitude_beyond_the_diagnosed_range() -> None:
     reach = rest.RangeSeen(MASTER, "x", np.array([0.5, 1.0, 2.0]), (0.0, 9.0), 0.0)
     far, more = rest.growth({MASTER: reach}, MASTER, 0.02)
     np.testing.assert_allclose(far, [1.0, 1.0, 2.0])
     np.testing.assert_allclose(more, [0.0, 0.0, 0.02 * rest.NEW])
 
 
-def test_an_error_has_the_share_of_the_envelope_as_its_rms() -> None:
+def test_the_rms_of_a_drawn_error_is_its_share_of_the_envelope() -> None:
     wave = np.sin(np.linspace(0.0, 40.0, 2000))
     drawn = rest.errors(np.tile(wave, (600, 1)), 0.1, np.random.default_rng(1))
     assert np.std(drawn, axis=0)[500:1500] == pytest.approx(np.full(1000, 0.1), rel=0.15)
 
 
-def test_a_prediction_is_a_recording_that_a_test_is_compared_with(
+def test_a_test_can_be_compared_with_a_predictions_recording(
     folder: Path, found: Prediction, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, plan = folder / "next.mcap", short(scale=0.2)
@@ -169,7 +169,7 @@ def test_a_prediction_is_a_recording_that_a_test_is_compared_with(
 @pytest.mark.parametrize(
     ("kind", "factor"), [("offset", 0.4), ("drift", 0.3), ("size", -0.2), ("delay", 0.01), ("noise", 0.3)]
 )
-def test_the_shape_of_an_error_is_found(kind: str, factor: float) -> None:
+def test_the_shape_of_a_prediction_error_is_found(kind: str, factor: float) -> None:
     t = np.linspace(0.0, 6.0, 3001)
     median = np.sin(5.0 * t)[:, None]
     wrong = {
@@ -204,7 +204,7 @@ ELSEWHERE = {"beyond_seen": {"slave": {"ratio": 1.0, "since": None, "energy_outs
         (FAR, 2.5, "noise", "So the sensor is noisier than in the diagnosed recording."),
     ],
 )
-def test_what_follows_from_a_signal_outside_its_band(
+def test_a_signal_outside_its_band_is_reported_with_advice(
     figures: dict[str, Any], start: float, kind: str, says: str
 ) -> None:
     wrong = shape.ErrorShape(kind, 0.01, 0.9 if kind else 0.2)
@@ -226,7 +226,7 @@ def held_code(folder: Path, name: str) -> int:
     return main()
 
 
-def test_where_messages_are_lost_the_line_is_no_single_draw_of_losses(tmp_path: Path) -> None:
+def test_with_lost_messages_the_predicted_line_is_not_a_single_draw_of_losses(tmp_path: Path) -> None:
     plan = short()
     written(tmp_path, plan, effect=[{"name": "link.loss", "probability": 0.3, "burst": 20.0}])
     laboratories = draws.load(tmp_path / "found.toml", plan)
@@ -239,7 +239,7 @@ def test_where_messages_are_lost_the_line_is_no_single_draw_of_losses(tmp_path: 
     assert np.std(middle - usual) < 0.7 * np.mean([np.std(one - usual) for one in other])
 
 
-def test_where_the_laboratories_as_found_are_unstable_the_line_is_the_median_of_those_drawn(
+def test_if_the_found_laboratories_are_unstable_the_line_is_the_median_of_the_draws(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = short()
@@ -254,7 +254,7 @@ def test_where_the_laboratories_as_found_are_unstable_the_line_is_the_median_of_
     assert prediction.sentences[0].startswith("In the laboratories as found the test is unstable")
 
 
-def test_another_building_leaves_out_what_is_of_the_first(tmp_path: Path) -> None:
+def test_a_prediction_for_another_building_leaves_out_the_first_buildings_parameters(tmp_path: Path) -> None:
     written(tmp_path, short(), structure={"stiffness": 26e6})
     heavier = tmp_path / "heavier.toml"
     heavier.write_text("[structure]\nmass = 200e3\n", encoding="utf-8")
@@ -283,7 +283,9 @@ def test_another_building_leaves_out_what_is_of_the_first(tmp_path: Path) -> Non
         ),
     ],
 )
-def test_what_is_said_of_errors_is_checked(wrong: dict[str, Any], says: str, tmp_path: Path) -> None:
+def test_the_uncertainty_file_of_a_reality_is_checked(
+    wrong: dict[str, Any], says: str, tmp_path: Path
+) -> None:
     path = written(tmp_path, short())
     with (tmp_path / "found.npz").open("wb") as stream:
         np.savez(stream, **replace(SPREAD, **wrong).arrays())  # type: ignore[arg-type]
@@ -291,7 +293,7 @@ def test_what_is_said_of_errors_is_checked(wrong: dict[str, Any], says: str, tmp
         draws.load(path, short())
 
 
-def test_too_few_draws_make_no_band(folder: Path) -> None:
+def test_too_few_draws_are_refused_for_a_band(folder: Path) -> None:
     with pytest.raises(InputError, match="19 laboratories are too few for a band: draw at least 20"):
         bands.predict(draws.load(folder / "found.toml", short()), short(), 19)
 
@@ -311,7 +313,7 @@ def test_too_few_draws_make_no_band(folder: Path) -> None:
         ('[found]\nrest = "found.npz"\n[[effect]]\nname = "damper.frictoin"\n', "Unknown effect"),
     ],
 )
-def test_a_bad_file_is_one_sentence(text: str, says: str, tmp_path: Path) -> None:
+def test_a_wrong_file_is_refused_in_one_sentence_by_predict(text: str, says: str, tmp_path: Path) -> None:
     written(tmp_path, short())
     (tmp_path / "text.npz").write_text("no archive", encoding="utf-8")
     (tmp_path / "empty.npz").touch()

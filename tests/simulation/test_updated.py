@@ -1,4 +1,4 @@
-"""A plan with the models that were found: its keys, the findings it cannot express, and the best compensator."""
+"""A plan updated with the models that were found: its keys, findings that it cannot express, best compensator."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ SLOWER: list[dict[str, Any]] = [
 
 @pytest.fixture
 def found(tmp_path: Path) -> FoundLaboratories:
-    """What was found of a slower actuator and a softer column that rubs."""
+    """The findings on a slower actuator and a softer column with friction."""
     plan = short()
     return draws.load(written(tmp_path, plan, column={"stiffness": 12e6}, effect=SLOWER), plan)
 
 
-def test_a_plan_says_what_its_language_can_and_lists_the_rest(
+def test_an_updated_plan_contains_the_findings_it_can_express_and_lists_the_others(
     found: FoundLaboratories, tmp_path: Path
 ) -> None:
     updated = nominal.update(found, short())
@@ -51,14 +51,14 @@ def test_a_plan_says_what_its_language_can_and_lists_the_rest(
 
 
 def of_one(plan: Plan, name: str, **values: float) -> FoundLaboratories:
-    """What was found is one effect of the catalogue."""
+    """Findings with one effect of the catalogue."""
     held = sites.holders(plan, CATALOGUE[name].site)
     entry = {"name": name, **values} | ({"laboratory": held[0]} if held else {})
     return FoundLaboratories(from_reality({"effect": [entry]}, plan, Path()), Spread())
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_every_effect_is_said_in_the_plan_or_listed_once(name: str) -> None:
+def test_every_effect_is_in_the_updated_plan_or_listed_once(name: str) -> None:
     sizes = {one.name: one.sizes[-1] if one.sizes else one.null for one in CATALOGUE[name].parameters}
     plan = short()
     updated = nominal.update(
@@ -83,7 +83,7 @@ def test_every_effect_is_said_in_the_plan_or_listed_once(name: str) -> None:
         ("structure.mass", {"factor": 1.1}),
     ],
 )
-def test_a_plan_that_says_an_effect_gives_the_same_test(name: str, values: dict[str, float]) -> None:
+def test_an_updated_plan_with_an_effect_gives_the_same_test(name: str, values: dict[str, float]) -> None:
     plan = short(1.5, scale=0.3)
     found = of_one(plan, name, **values)
     updated = nominal.update(found, plan)
@@ -96,7 +96,7 @@ def test_a_plan_that_says_an_effect_gives_the_same_test(name: str, values: dict[
     assert np.max(np.abs(planned - as_found)) > 1e-3 * np.max(np.abs(as_found))
 
 
-def test_only_the_first_of_two_laws_of_a_column_is_said() -> None:
+def test_only_the_first_of_two_laws_of_a_column_is_in_the_updated_plan() -> None:
     plan = short()
     laws = [
         {"name": "column.yielding", "yield_displacement": 1e-3},
@@ -108,7 +108,7 @@ def test_only_the_first_of_two_laws_of_a_column_is_said() -> None:
     assert [sentence.split()[0] for sentence in updated.unsaid] == ["column.self_centring"]
 
 
-def test_noise_that_differs_from_the_plan_is_said(tmp_path: Path) -> None:
+def test_noise_that_differs_from_the_plan_is_in_the_updated_plan(tmp_path: Path) -> None:
     plan = plans.load(Path("rths/plans/default.toml"))
     found = draws.load(written(tmp_path, plan), plan)
     louder = found.spread.noise | {"master": {"column_force": 151.23}}
@@ -117,7 +117,7 @@ def test_noise_that_differs_from_the_plan_is_said(tmp_path: Path) -> None:
     assert updated.said == ("sensors.column_force: 100 → 151",)
 
 
-def test_slaves_of_a_name_have_their_own_tables(tmp_path: Path) -> None:
+def test_named_slaves_have_their_own_tables_in_the_updated_plan(tmp_path: Path) -> None:
     plan = plans.load(Path("rths/plans/two_dampers.toml"))
     name = next(iter(plan.slaves))
     heavier = {"name": "damper.mass", "laboratory": f"slave.{name}", "factor": 1.1}
@@ -128,7 +128,7 @@ def test_slaves_of_a_name_have_their_own_tables(tmp_path: Path) -> None:
     assert set(masses.values()) == {1.0}
 
 
-def test_paths_of_a_plan_start_from_the_folder_of_the_new_one(tmp_path: Path) -> None:
+def test_paths_in_an_updated_plan_are_relative_to_its_folder(tmp_path: Path) -> None:
     (tmp_path / "plans").mkdir()
     (tmp_path / "plans" / "motion.txt").write_text("0.0\n1.0\n", encoding="utf-8")
     tables: dict[str, Any] = {
@@ -141,7 +141,7 @@ def test_paths_of_a_plan_start_from_the_folder_of_the_new_one(tmp_path: Path) ->
     assert tables["master"]["kind"] == "column"
 
 
-def test_the_series_of_an_inverse_undoes_the_lag() -> None:
+def test_the_series_of_an_inverse_compensates_the_lag() -> None:
     lag = Lag(0.01, 0.02, 2.0)
     coefficients = list(lag.inverse.values())
     s = 1.0 + 2.0j
@@ -149,7 +149,7 @@ def test_the_series_of_an_inverse_undoes_the_lag() -> None:
     assert inverse == pytest.approx((0.02 * s + 1.0) * (2.718281828459045 ** (0.01 * s)) / 2.0, rel=1e-6)
 
 
-def test_the_compensator_that_serves_best_follows_better_than_the_planned_one(
+def test_the_advised_compensator_tracks_better_than_the_planned_one(
     found: FoundLaboratories,
 ) -> None:
     updated = nominal.update(found, short()).plan

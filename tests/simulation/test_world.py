@@ -1,4 +1,4 @@
-"""The scheduler: order, clocks, waiting, stalls, ends."""
+"""The scheduler of simulated processes: order, clocks, waiting, pauses, and ends."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def world(limit_s: float = 10.0) -> World:
     return World(round(limit_s * 1e9))
 
 
-def test_what_happens_at_one_time_happens_in_the_order_of_asking() -> None:
+def test_events_at_the_same_time_happen_in_the_order_in_which_they_were_scheduled() -> None:
     one = world()
     found: list[str] = []
     process = one.process("any")
@@ -60,7 +60,7 @@ def test_a_clock_drifts_and_sleeps_by_its_own_time(ppb: int) -> None:
     assert one.time == pytest.approx(1_000_000 * MS / (1.0 + ppb * 1e-9), abs=2)
 
 
-def test_a_stall_makes_late_what_should_have_run() -> None:
+def test_a_pause_delays_what_was_due_in_it() -> None:
     one, found = world(), []
     process = one.process("any")
 
@@ -75,7 +75,7 @@ def test_a_stall_makes_late_what_should_have_run() -> None:
     assert found == [2, 9, 9, 9, 10, 12]
 
 
-def test_what_is_computed_takes_time_before_the_next_wait() -> None:
+def test_computation_takes_its_time_before_the_next_wait() -> None:
     one = world()
     process = one.process("any")
     seen: list[int] = []
@@ -91,7 +91,7 @@ def test_what_is_computed_takes_time_before_the_next_wait() -> None:
     assert seen == [3 * MS, 3 * MS]
 
 
-def test_who_is_killed_says_nothing_more_and_the_world_goes_on() -> None:
+def test_a_killed_process_does_nothing_more_and_the_simulation_goes_on() -> None:
     one, found = world(), []
 
     def body(process: Process) -> None:
@@ -111,7 +111,7 @@ def test_who_is_killed_says_nothing_more_and_the_world_goes_on() -> None:
     assert not one.processes["lives"].killed
 
 
-def test_an_exception_is_kept_and_who_hangs_is_left_at_the_limit() -> None:
+def test_an_exception_is_kept_and_a_process_that_hangs_is_abandoned_at_the_limit() -> None:
     one = world(0.01)
     broken, hangs = one.process("broken"), one.process("hangs")
 
@@ -132,7 +132,7 @@ def test_an_exception_is_kept_and_who_hangs_is_left_at_the_limit() -> None:
     assert one.time <= one.limit
 
 
-def test_the_interpreter_is_as_it_was_afterwards() -> None:
+def test_the_interpreters_settings_are_restored_after_a_simulation() -> None:
     def body() -> None:
         gc.disable()
         sys.setswitchinterval(1e-4)
@@ -147,7 +147,7 @@ def test_the_interpreter_is_as_it_was_afterwards() -> None:
     assert gc.get_freeze_count() <= frozen
 
 
-def test_a_world_that_pauses_goes_on_where_it_was() -> None:
+def test_a_simulation_that_pauses_continues_where_it_was() -> None:
     one, found = world(), []
     process = one.process("any")
 
@@ -167,7 +167,7 @@ def test_a_world_that_pauses_goes_on_where_it_was() -> None:
     assert process.ended
 
 
-def test_who_waits_for_a_message_goes_on_when_it_comes_and_else_when_its_time_is_over() -> None:
+def test_a_wait_for_a_message_ends_with_the_message_or_after_its_timeout() -> None:
     one, found = world(), []
     hears, sends = one.process("hears"), one.process("sends")
 

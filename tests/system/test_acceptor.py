@@ -23,7 +23,7 @@ print(*sorted(name for name in names if name.startswith("acc-")))
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="this system does not list its threads")
-def test_connections_are_taken_in_two_threads_so_that_a_close_that_waits_holds_up_none() -> None:
+def test_connections_are_accepted_in_two_threads_so_that_a_slow_close_delays_none() -> None:
     done = subprocess.run(
         [sys.executable, "-c", THREADS],
         capture_output=True,

@@ -16,7 +16,7 @@ def test_a_benchmark_runs_and_gives_figures(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_small_burst_is_recorded_whole() -> None:
+def test_a_small_burst_is_recorded_completely() -> None:
     (burst,) = recorder.bursts(recorder.BURSTS[:1], recorder.QUICK_BURST_S)
     assert burst.whole
     assert burst.reported == 0

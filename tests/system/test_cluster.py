@@ -104,7 +104,7 @@ def wait_for(command: subprocess.Popen[bytes], user: Path, table: str, least: in
 
 
 @pytest.mark.timeout(600)
-def test_a_worker_and_a_command_that_are_killed_lose_and_double_nothing(
+def test_a_killed_worker_and_a_killed_command_lose_no_row_and_repeat_none(
     machines: tuple[str, str], user: Path, tmp_path: Path
 ) -> None:
     first, second = machines

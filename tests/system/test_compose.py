@@ -16,7 +16,7 @@ SKIPPED = 77
 
 
 @pytest.mark.timeout(960)
-def test_the_services_leave_a_whole_recording() -> None:
+def test_the_services_write_a_complete_recording() -> None:
     if (
         shutil.which("docker") is None
         or subprocess.run(["docker", "info"], capture_output=True, timeout=HANG_S).returncode != 0

@@ -1,4 +1,4 @@
-"""Processes that are stopped, killed or never come: exit codes, what is said, and that nobody is left."""
+"""Processes that are stopped, killed or never start: exit codes, messages, and that no process remains."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.processes import HANG_S
 from tests.system.started import crew, finish, free_port, gone, plan_file, start, wait_for_ticks
 
 
-def test_ctrl_c_stops_in_order_and_keeps_the_recording(tmp_path: Path) -> None:
+def test_ctrl_c_stops_a_run_in_order_and_keeps_the_recording(tmp_path: Path) -> None:
     path = tmp_path / "stopped.mcap"
     process = start("run", patient(path.parent), "--duration", "60", "-o", path)
     wait_for_ticks(path)
@@ -36,7 +36,7 @@ def test_ctrl_c_stops_in_order_and_keeps_the_recording(tmp_path: Path) -> None:
     assert "stopped by the user" in recording.metadata["summary"]["cause"]
 
 
-def test_a_killed_front_door_ends_the_test_in_order(tmp_path: Path) -> None:
+def test_after_the_run_command_is_killed_the_test_ends_in_order(tmp_path: Path) -> None:
     path = tmp_path / "orphan.mcap"
     process = start("run", patient(path.parent), "--duration", "60", "-o", path)
     wait_for_ticks(path)
@@ -70,7 +70,7 @@ def test_ctrl_c_in_the_first_moments_ends_soon(seconds: float, tmp_path: Path) -
 @pytest.mark.slow
 @LINUX
 @pytest.mark.parametrize("seconds", [0.0, 0.7])
-def test_a_front_door_killed_in_the_first_moments_leaves_nobody(seconds: float, tmp_path: Path) -> None:
+def test_a_run_command_that_is_killed_at_once_leaves_no_process(seconds: float, tmp_path: Path) -> None:
     process = start("run", patient(tmp_path), "--duration", "60", "-o", tmp_path / "a.mcap")
     numbers = crew(process).values()
     time.sleep(seconds)
@@ -83,7 +83,7 @@ def test_a_front_door_killed_in_the_first_moments_leaves_nobody(seconds: float, 
 
 
 @LINUX
-def test_a_killed_slave_is_noticed_by_the_master_and_named(tmp_path: Path) -> None:
+def test_a_killed_slave_is_detected_and_named_by_the_master(tmp_path: Path) -> None:
     path, planned = tmp_path / "a.mcap", tmp_path / "plan.toml"
     planned.write_text(PATIENT + "[link]\nloss_timeout = 3.0\n[recording]\npatience = 1.0\n")
     process = start("run", planned, "--duration", "60", "-o", path)
@@ -103,7 +103,7 @@ def test_a_killed_slave_is_noticed_by_the_master_and_named(tmp_path: Path) -> No
 
 @pytest.mark.slow
 @LINUX
-def test_a_run_with_a_slave_that_hangs_ends_all_the_same(tmp_path: Path) -> None:
+def test_a_run_with_a_slave_that_hangs_ends(tmp_path: Path) -> None:
     path, planned = tmp_path / "a.mcap", tmp_path / "plan.toml"
     planned.write_text(PATIENT + "[link]\nloss_timeout = 3.0\n[recording]\npatience = 1.0\n")
     process = start("run", planned, "--duration", "60", "-o", path)
@@ -163,7 +163,7 @@ def test_a_killed_master_ends_the_slave_with_exit_code_4(three: dict[str, Any], 
 
 
 @pytest.mark.slow
-def test_a_killed_recorder_loses_a_second_at_most(three: dict[str, Any], tmp_path: Path) -> None:
+def test_a_killed_recorder_loses_at_most_one_second(three: dict[str, Any], tmp_path: Path) -> None:
     wait_for_ticks(tmp_path / "a.mcap", 1500)
     three["recorder"].kill()
     killed = time.time()
@@ -193,7 +193,7 @@ def test_plans_that_differ_are_refused_with_exit_code_2(tmp_path: Path) -> None:
         assert "Traceback" not in err
 
 
-def test_nobody_there_is_exit_code_4_in_the_time_the_plan_allows(tmp_path: Path) -> None:
+def test_a_missing_partner_gives_exit_code_4_within_the_connect_timeout(tmp_path: Path) -> None:
     plan = plan_file(tmp_path, connect_timeout=1.0)
     master = start(plan, "--listen", f"tcp/127.0.0.1:{free_port()}", module="master")
     slave = start(plan, "--connect", f"tcp/127.0.0.1:{free_port()}", module="slave")
@@ -206,7 +206,7 @@ def test_nobody_there_is_exit_code_4_in_the_time_the_plan_allows(tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_ctrl_c_before_the_other_is_there_ends_soon(tmp_path: Path) -> None:
+def test_ctrl_c_before_the_partner_is_there_ends_a_process_soon(tmp_path: Path) -> None:
     plan = plan_file(tmp_path)
     processes = [
         start(plan, "--listen", f"tcp/127.0.0.1:{free_port()}", module="master"),
@@ -221,7 +221,7 @@ def test_ctrl_c_before_the_other_is_there_ends_soon(tmp_path: Path) -> None:
         assert "Traceback" not in err
 
 
-def test_a_port_in_use_is_exit_code_2(tmp_path: Path) -> None:
+def test_a_port_in_use_gives_exit_code_2(tmp_path: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -232,7 +232,7 @@ def test_a_port_in_use_is_exit_code_2(tmp_path: Path) -> None:
     assert "Traceback" not in err
 
 
-def test_an_endpoint_that_is_none_is_exit_code_2(tmp_path: Path) -> None:
+def test_an_invalid_endpoint_gives_exit_code_2(tmp_path: Path) -> None:
     for module, option in (("master", "--listen"), ("slave", "--connect")):
         code, _, err = finish(start(plan_file(tmp_path), option, "nonsense", module=module))
         assert code == 2, err
@@ -240,7 +240,7 @@ def test_an_endpoint_that_is_none_is_exit_code_2(tmp_path: Path) -> None:
         assert "Traceback" not in err
 
 
-def test_a_folder_without_permission_is_exit_code_2(tmp_path: Path) -> None:
+def test_a_folder_without_permission_gives_exit_code_2(tmp_path: Path) -> None:
     (tmp_path / "runs").write_text("a file where the folder should be")
     code, _, err = finish(start("run", "--duration", "1", cwd=tmp_path))
     assert code == 2

@@ -1,4 +1,4 @@
-"""The live view in a real browser: every plot drawn, nothing complained of, nothing fetched from elsewhere."""
+"""The live view in a real browser: every plot is drawn, without errors and without requests to other hosts."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def served(tmp_path: Path, virtual_recording: Path) -> Iterator[tuple[str, threa
     assert process.returncode == 0
 
 
-def test_a_test_is_seen_while_it_runs_and_after_its_end_on_any_screen(
+def test_a_test_is_shown_during_its_run_and_after_its_end_on_any_screen(
     served: tuple[str, threading.Thread], tmp_path: Path
 ) -> None:
     url, growing = served

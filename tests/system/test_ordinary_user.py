@@ -52,7 +52,7 @@ def burners() -> Iterator[None]:
         yield
 
 
-def test_a_user_without_rights_completes_the_test_on_a_machine_that_pauses_it(tmp_path: Path) -> None:
+def test_a_user_without_privileges_completes_the_test_on_a_machine_that_pauses_it(tmp_path: Path) -> None:
     if os.geteuid() != 0 or subprocess.run(MAY_TAKE_PROCESSORS, check=False, timeout=HANG_S).returncode:
         pytest.skip("only root may take the processors away with FIFO 99")
     if not all(map(shutil.which, ("setpriv", "chrt", "prlimit", "taskset"))):

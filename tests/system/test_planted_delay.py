@@ -109,7 +109,7 @@ def time_namespaces() -> None:
     ("way", "segment", "other"),
     [("there", "command_one_way", "feedback_one_way"), ("back", "feedback_one_way", "command_one_way")],
 )
-def test_a_delay_in_one_direction_shows_as_that_segment(
+def test_a_delay_in_one_direction_appears_in_that_segment(
     tmp_path: Path, way: str, segment: str, other: str
 ) -> None:
     for attempt in range(ATTEMPTS):

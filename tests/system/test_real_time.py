@@ -88,14 +88,14 @@ def ticks_in_time(recording: Run) -> int:
     return min((int(found[0]) for found in late if found.size), default=recording.ticks("master"))
 
 
-def test_a_real_test_replays_to_the_last_bit_late_messages_or_not(
+def test_a_real_test_replays_to_the_last_bit_with_or_without_late_messages(
     real_run: tuple[dict[str, Any], Run],
 ) -> None:
     code, out, err = finish(start("replay", real_run[1].path))
     assert code == 0, out + err
 
 
-def test_the_accounts_of_latency_add_up(real_run: tuple[dict[str, Any], Run]) -> None:
+def test_the_latency_segments_of_a_real_test_add_up(real_run: tuple[dict[str, Any], Run]) -> None:
     columns = real_run[1].columns["latency"]
     good = columns["deadline_missed"] == 0
     assert np.count_nonzero(good) > 0.5 * good.size
@@ -129,7 +129,7 @@ class Loud:
 
 
 @pytest.mark.slow
-def test_a_rig_that_prints_holds_nobody_up(tmp_path: Path) -> None:
+def test_a_rig_that_prints_delays_no_process(tmp_path: Path) -> None:
     (tmp_path / "loud.py").write_text(LOUD)
     plan = tmp_path / "loud.toml"
     plan.write_text(f"[test]\nduration = 1.0\n{PATIENT}[master.rig]\nclass = 'loud.py:Loud'\n")

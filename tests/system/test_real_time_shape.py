@@ -41,7 +41,7 @@ def machines(path: Path, *words: str) -> dict[str, str]:
 
 
 @fifo
-def test_both_laboratories_have_priority_and_the_recording_says_so(tmp_path: Path) -> None:
+def test_both_laboratories_have_real_time_priority_and_the_recording_states_it(tmp_path: Path) -> None:
     found = machines(tmp_path / "a.mcap")
     assert found["master.scheduler"] == found["slave.scheduler"] == f"fifo {PRIORITY}"
     if len(os.sched_getaffinity(0)) > 1:
@@ -52,14 +52,14 @@ def test_both_laboratories_have_priority_and_the_recording_says_so(tmp_path: Pat
     assert float(found["bare_loop.p50"]) <= float(found["bare_loop.p99"]) <= float(found["bare_loop.max"])
 
 
-def test_without_it_the_recording_says_that_too(tmp_path: Path) -> None:
+def test_without_real_time_priority_the_recording_states_that(tmp_path: Path) -> None:
     found = machines(tmp_path / "a.mcap", "--rt", "off")
     assert found["master.scheduler"] == found["slave.scheduler"] == "other"
     assert float(found["master.memory_locked"]) == 0.0
     assert "bare_loop.p99" in found
 
 
-def test_virtual_time_says_nothing_of_a_machine(tmp_path: Path) -> None:
+def test_a_recording_in_virtual_time_states_nothing_about_a_machine(tmp_path: Path) -> None:
     assert machines(tmp_path / "a.mcap", "--virtual") == {}
 
 

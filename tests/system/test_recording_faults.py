@@ -95,7 +95,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", "--lazy", str(folder)], check=True, timeout=HANG_S)
 
 
-def test_a_full_disk_stops_the_test_in_order_and_leaves_what_was_written(
+def test_a_full_disk_stops_the_test_in_order_and_keeps_the_written_samples(
     tmp_path: Path, small_disk: Path
 ) -> None:
     path = small_disk / "a.mcap"
@@ -122,7 +122,7 @@ def test_a_full_disk_stops_the_test_in_order_and_leaves_what_was_written(
     passed("F46", "disk full", "a real disk of 700 kB", "ended in order, exit code 3", None, None, evidence)
 
 
-def test_a_recorder_alone_on_a_full_disk_refuses_with_a_sentence(tmp_path: Path, small_disk: Path) -> None:
+def test_a_recorder_on_a_full_disk_refuses_the_test_in_one_sentence(tmp_path: Path, small_disk: Path) -> None:
     (small_disk / "ballast").write_bytes(bytes(700_000))
     plan = plan_file(tmp_path, 20.0, preflight="disk_factor = 0.0")
     code, _, err = finish(start("run", plan, "--virtual", "-o", small_disk / "a.mcap"))
@@ -132,7 +132,7 @@ def test_a_recorder_alone_on_a_full_disk_refuses_with_a_sentence(tmp_path: Path,
     assert "Traceback" not in err
 
 
-def test_a_recorder_that_is_held_up_for_seven_seconds_gets_what_it_missed(tmp_path: Path) -> None:
+def test_a_recorder_that_is_paused_for_seven_seconds_receives_the_missed_samples(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     plan = plan_file(tmp_path, 11.0, recording="patience = 20.0")
     process = start("run", plan, "-o", path, "--rt", "off")

@@ -93,7 +93,7 @@ def appeared(path: Path, process: subprocess.Popen[str], seconds: float) -> None
 
 
 @pytest.mark.timeout(180)
-def test_a_second_ctrl_c_leaves_the_specimen_unloaded_the_rig_disarmed_and_the_recording_whole(
+def test_after_a_second_ctrl_c_the_specimen_is_unloaded_the_rig_disarmed_the_recording_complete(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "lab.py").write_text(LAB)

@@ -1,4 +1,4 @@
-"""The link with certificates over real sessions: who gets a frame through, who does not, and what each is told."""
+"""The link with certificates over real sessions: which roles may send which frames, and the messages otherwise."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def folder(authority: tuple[Path, dict[str, keys.Owner]]) -> Path:
     return authority[0]
 
 
-def test_the_roles_of_a_test_hear_each_other_as_on_an_open_link(folder: Path) -> None:
+def test_the_roles_of_a_test_reach_each_other_as_on_an_open_link(folder: Path) -> None:
     with ears(folder, "slave", "recorder", "operator") as found:
         found["master"].link.send(TICK, b"command")
         assert found["slave"].next() == ("master", TICK, b"command")
@@ -58,7 +58,7 @@ def test_the_roles_of_a_test_hear_each_other_as_on_an_open_link(folder: Path) ->
             assert found[role].until(b"reset") in ([], [b"recorder"])
 
 
-def test_named_slaves_hear_their_own_commands_alone(tmp_path: Path) -> None:
+def test_named_slaves_receive_only_their_own_commands(tmp_path: Path) -> None:
     slaves = ("slave.roof", "slave.middle")
     owners = keys.certificates(("master", *slaves), (), NOW - DAY, NOW + DAY)
     keys.write(tmp_path / "keys", owners)
@@ -76,7 +76,7 @@ def test_named_slaves_hear_their_own_commands_alone(tmp_path: Path) -> None:
             assert heard == ("master", TICK, slave.encode())
 
 
-def test_an_observer_hears_everything_and_cannot_say_a_thing(folder: Path) -> None:
+def test_an_observer_receives_everything_and_can_send_nothing(folder: Path) -> None:
     with ears(folder, "slave", "recorder", "observer") as found:
         for role, channel in (("master", TICK), ("slave", TICK), ("slave", SAMPLES), ("recorder", CONTROL)):
             found[role].link.send(channel, b"said")
@@ -106,14 +106,14 @@ def master(folder: Path) -> Iterator[tuple[Ear, str, list[str]]]:
     ear.link.close()
 
 
-def test_without_a_certificate_nobody_gets_in(master: tuple[Ear, str, list[str]], folder: Path) -> None:
+def test_nobody_connects_without_a_certificate(master: tuple[Ear, str, list[str]], folder: Path) -> None:
     with pytest.raises(LostError, match=r"asks for a certificate, but this plan has none: name the folder"):
         Ear("slave", None, connect=master[1], patience=0.1)
     with pytest.raises(zenoh.ZError), bare(master[1], None):
         pass
 
 
-def test_a_slave_with_certificates_says_that_the_master_has_none(folder: Path) -> None:
+def test_a_slave_with_certificates_reports_that_the_master_has_none(folder: Path) -> None:
     endpoint = listenable()
     ear = Ear("master", None, listen=endpoint)
     try:
@@ -148,7 +148,7 @@ def test_a_link_ends_when_a_certificate_expires(
         assert ears["slave"].next(SHORT_S) is None
 
 
-def test_with_certificates_of_another_authority_nobody_gets_in(
+def test_nobody_connects_with_certificates_of_another_authority(
     master: tuple[Ear, str, list[str]], folder: Path, tmp_path: Path
 ) -> None:
     made(tmp_path / "foreign")
@@ -165,7 +165,7 @@ def test_with_certificates_of_another_authority_nobody_gets_in(
             pass
 
 
-def test_an_expired_certificate_lets_nobody_in(
+def test_nobody_connects_with_an_expired_certificate(
     master: tuple[Ear, str, list[str]], authority: tuple[Path, dict[str, keys.Owner]], tmp_path: Path
 ) -> None:
     old = identity(again(tmp_path / "old", authority[1], "slave", NOW - 2 * DAY, NOW - DAY), "slave")
@@ -177,7 +177,7 @@ def test_an_expired_certificate_lets_nobody_in(
         pass
 
 
-def test_a_master_whose_certificate_expired_or_is_a_slaves_is_not_dialled(
+def test_a_master_whose_certificate_expired_or_is_a_slaves_is_refused(
     authority: tuple[Path, dict[str, keys.Owner]], tmp_path: Path
 ) -> None:
     folder, owners = authority
@@ -196,7 +196,7 @@ def test_a_master_whose_certificate_expired_or_is_a_slaves_is_not_dialled(
             ear.link.close()
 
 
-def test_a_master_is_dialled_by_the_names_of_its_certificate_only(
+def test_a_master_is_reached_only_under_the_names_in_its_certificate(
     master: tuple[Ear, str, list[str]], folder: Path
 ) -> None:
     other = master[1].replace("127.0.0.1", "127.0.0.2")
@@ -227,7 +227,7 @@ def test_a_recorders_certificate_cannot_command_the_slave(folder: Path, mode: st
     passed("F52", "no credentials, or another role's", how, "refused", None, 0.0, evidence)
 
 
-def test_a_slaves_certificate_cannot_listen_to_what_is_not_for_it(folder: Path) -> None:
+def test_a_slaves_certificate_receives_no_messages_for_others(folder: Path) -> None:
     with ears(folder, "slave", "recorder") as found:
         stolen: list[bytes] = []
         endpoint = found["master"].endpoint  # type: ignore[attr-defined]
@@ -241,7 +241,7 @@ def test_a_slaves_certificate_cannot_listen_to_what_is_not_for_it(folder: Path) 
         assert stolen == []
 
 
-def test_a_visitor_with_a_certificate_of_no_role_is_noticed_and_gets_nothing_through(folder: Path) -> None:
+def test_a_visitor_whose_certificate_has_no_role_is_reported_and_sends_nothing(folder: Path) -> None:
     noticed, told = Event(), []
 
     def notice(text: str) -> None:
@@ -304,7 +304,7 @@ def everything(path: Path) -> bytes:
     return b"\n".join(parts)
 
 
-def test_a_whole_test_runs_with_certificates_and_no_key_is_in_what_it_leaves(planned: Path) -> None:
+def test_a_complete_test_runs_with_certificates_and_writes_no_key_to_any_file(planned: Path) -> None:
     output = planned.parent / "out.mcap"
     found = rths("run", planned, "--rt", "off", "-o", output)
     assert found.returncode == 0, found.stderr
@@ -347,7 +347,7 @@ def foreign_authority(folder: Path, other: Path) -> None:
         (foreign_authority, "was issued by another authority than"),
     ],
 )
-def test_a_slave_that_is_refused_says_why_and_ends_with_2(
+def test_a_slave_that_is_refused_states_the_reason_and_ends_with_exit_code_2(
     spoil: Spoil, sentence: str, planned: Path, tmp_path: Path, folder: Path
 ) -> None:
     endpoint = listenable()

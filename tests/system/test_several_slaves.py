@@ -76,7 +76,7 @@ def test_real_time_equals_virtual_time_until_a_message_of_any_slave_is_late(tmp_
 
 
 @pytest.mark.parametrize("count", [4, 8])
-def test_four_and_eight_slaves_in_real_time(count: int, tmp_path: Path) -> None:
+def test_tests_with_four_and_eight_slaves_run_in_real_time(count: int, tmp_path: Path) -> None:
     names = [f"lab{place}" for place in range(count)]
     path = tmp_path / "many.mcap"
     code, out, err = finish(
@@ -123,7 +123,9 @@ def test_a_killed_slave_of_two_ends_the_test_with_exit_code_4_and_is_named(
     assert "The master stopped the test: The slave 'middle' has been silent for 0.5 s." in err
 
 
-def test_the_second_slave_of_a_name_is_refused_and_the_test_goes_on(by_hand: Start, tmp_path: Path) -> None:
+def test_a_second_slave_under_the_same_name_is_refused_and_the_test_goes_on(
+    by_hand: Start, tmp_path: Path
+) -> None:
     for name in ("roof", "middle"):
         by_hand("slave", "--name", name)
     by_hand("recorder", "-o", tmp_path / "a.mcap")
@@ -138,7 +140,7 @@ def test_the_second_slave_of_a_name_is_refused_and_the_test_goes_on(by_hand: Sta
     assert master.poll() is None
 
 
-def test_of_two_slaves_that_wait_under_one_name_one_is_refused(by_hand: Start, tmp_path: Path) -> None:
+def test_one_of_two_slaves_that_wait_under_the_same_name_is_refused(by_hand: Start, tmp_path: Path) -> None:
     same = [by_hand("slave", "--name", "roof") for _ in range(2)]
     by_hand("slave", "--name", "middle")
     by_hand("recorder", "-o", tmp_path / "a.mcap")
@@ -149,7 +151,7 @@ def test_of_two_slaves_that_wait_under_one_name_one_is_refused(by_hand: Start, t
     assert "takes part in this test already" in ended[0].communicate()[1]
 
 
-def test_a_slave_under_an_unknown_name_is_exit_code_2(by_hand: Start) -> None:
+def test_a_slave_under_an_unknown_name_gives_exit_code_2(by_hand: Start) -> None:
     code, _, err = finish(by_hand("slave", "--name", "rof"))
     assert code == 2
     assert "The plan names no slave 'rof': did you mean roof?" in err

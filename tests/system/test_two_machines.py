@@ -53,7 +53,7 @@ def await_all(processes: dict[str, subprocess.Popen[str]]) -> None:
             process.communicate()
 
 
-def test_a_test_on_two_machines_is_recorded_whole(machines: tuple[str, str], tmp_path: Path) -> None:
+def test_a_test_on_two_machines_is_recorded_completely(machines: tuple[str, str], tmp_path: Path) -> None:
     first, second = machines
     path = tmp_path / "two.mcap"
     words = (patient(tmp_path), "--duration", "4")
@@ -70,7 +70,7 @@ def test_a_test_on_two_machines_is_recorded_whole(machines: tuple[str, str], tmp
         assert recording.sequences[topic].tolist() == list(range(2000))
 
 
-def test_two_slaves_one_beside_the_master_and_one_across_the_cable(
+def test_two_slaves_run_beside_the_master_and_across_the_cable(
     machines: tuple[str, str], tmp_path: Path
 ) -> None:
     first, second = machines
@@ -91,7 +91,9 @@ def test_two_slaves_one_beside_the_master_and_one_across_the_cable(
         assert recording.sequences[topic].tolist() == list(range(1500))
 
 
-def test_a_cable_that_is_pulled_ends_both_with_exit_code_4(machines: tuple[str, str], tmp_path: Path) -> None:
+def test_after_the_cable_is_pulled_both_end_with_exit_code_4(
+    machines: tuple[str, str], tmp_path: Path
+) -> None:
     first, second = machines
     plan = tmp_path / "plan.toml"
     plan.write_text(

@@ -97,7 +97,7 @@ def exchange(asking: FrameEndpoint, answering: FrameEndpoint, seq: int) -> float
     return time.monotonic() - began
 
 
-def test_a_frame_is_one_write_and_waits_for_no_acknowledgement(
+def test_a_frame_is_one_write_and_does_not_wait_for_an_acknowledgement(
     ends: tuple[FrameEndpoint, FrameEndpoint, Relay],
 ) -> None:
     master, slave, relay = ends
@@ -140,6 +140,6 @@ def write_write_read(count: int) -> list[float]:
     return found
 
 
-def test_the_limit_would_notice_the_pattern() -> None:
+def test_the_limit_detects_the_write_write_read_pattern() -> None:
     # the first exchanges of a connection are acknowledged at once
     assert statistics.median(write_write_read(40)[20:]) > DELAYED_ACK_S

@@ -19,7 +19,7 @@ from rths.perform.live_child import READY, View
 
 
 def told(view: View, seconds: float = 40.0) -> str:
-    """What a view has to say first."""
+    """The first line that a view prints."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         if news := view.news():
@@ -28,7 +28,7 @@ def told(view: View, seconds: float = 40.0) -> str:
     raise TimeoutError
 
 
-def test_it_says_where_it_is_and_leaves_by_itself_when_the_test_has_ended(
+def test_the_view_prints_its_address_and_ends_by_itself_after_the_test(
     tmp_path: Path, virtual_recording: Path
 ) -> None:
     path = tmp_path / "new.mcap"
@@ -47,7 +47,7 @@ def test_it_says_where_it_is_and_leaves_by_itself_when_the_test_has_ended(
         view.close()
 
 
-def test_where_it_cannot_serve_the_user_is_told_once(tmp_path: Path) -> None:
+def test_a_view_that_cannot_serve_tells_the_user_once(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         view = View(tmp_path / "a.mcap", port)
@@ -60,7 +60,7 @@ def test_where_it_cannot_serve_the_user_is_told_once(tmp_path: Path) -> None:
     view.close()
 
 
-def test_a_view_that_cannot_be_started_is_a_line_too(tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_view_that_cannot_be_started_gives_one_line(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr("sys.executable", str(tmp_path / "nothing"))
     view = View(tmp_path / "a.mcap", 0)
     assert "No such file or directory" in view.news()
@@ -94,7 +94,7 @@ class Test:
 
 
 class Unwished:
-    """Nobody wants to stop."""
+    """No request to stop."""
 
     presses = 0
 

@@ -33,7 +33,7 @@ def test_a_mistake_gives_one_sentence(words: list[str], sentence: str, call: Any
     assert err.count("\n") == 1
 
 
-def test_what_is_no_recording_is_said_before_anything_is_served(
+def test_a_file_that_is_not_a_recording_is_refused_before_anything_is_served(
     tmp_path: Path, monkeypatch: Any, call: Any, capsys: Any
 ) -> None:
     path = tmp_path / "a.mcap"
@@ -48,7 +48,7 @@ def test_what_is_no_recording_is_said_before_anything_is_served(
     ("options", "whole", "window"),
     [((), True, 4.5), (("--window", "2"), False, 2.0), (("--wait",), False, 10.0)],
 )
-def test_a_finished_recording_is_shown_whole_unless_a_window_is_given(
+def test_a_finished_recording_is_shown_completely_unless_a_window_is_given(
     options: tuple[str, ...], whole: bool, window: float, virtual_recording: Path, monkeypatch: Any, call: Any
 ) -> None:
     shown: list[Feed] = []
@@ -70,9 +70,7 @@ def test_a_finished_recording_is_shown_whole_unless_a_window_is_given(
     assert shown[0].window == pytest.approx(window, abs=0.5)
 
 
-def test_a_recording_that_is_not_finished_is_shown_as_far_as_it_is(
-    virtual_recording: Path, tmp_path: Path
-) -> None:
+def test_an_unfinished_recording_is_shown_as_far_as_it_goes(virtual_recording: Path, tmp_path: Path) -> None:
     content = virtual_recording.read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(content[: len(content) // 2])
@@ -81,7 +79,7 @@ def test_a_recording_that_is_not_finished_is_shown_as_far_as_it_is(
     assert 4.0 <= length(virtual_recording) < 5.0
 
 
-def test_ctrl_c_ends_it_with_exit_code_0(virtual_recording: Path) -> None:
+def test_ctrl_c_ends_the_live_command_with_exit_code_0(virtual_recording: Path) -> None:
     words = [sys.executable, "-m", "rths", "live", str(virtual_recording), "--no-browser"]
     with subprocess.Popen(
         words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -85,7 +85,7 @@ def thinned(run: Run, topic: str, name: str, step: int) -> Any:
     return run.columns[topic][name][::step]
 
 
-def test_before_anything_is_recorded_the_page_says_so_and_its_axes_are_there(growing: Growing) -> None:
+def test_before_anything_is_recorded_the_page_states_this_and_shows_its_axes(growing: Growing) -> None:
     growing.to(0.0)
     assert "waiting for the recording to begin" in growing.text
     assert growing.source("master")["column_force"].tolist() == [0.0]
@@ -161,7 +161,7 @@ def test_a_window_bounds_what_a_page_holds(virtual_recording: Path, grow: Grow) 
 
 
 @pytest.mark.slow
-def test_the_whole_of_a_long_recording_is_shown_with_all_that_is_extreme(
+def test_a_long_recording_is_shown_completely_with_its_extreme_values(
     default_plan: Plan, tmp_path: Path, grow: Grow
 ) -> None:
     path = tmp_path / "long.mcap"
@@ -189,7 +189,7 @@ def test_the_whole_of_a_long_recording_is_shown_with_all_that_is_extreme(
     assert growing.page.plots["column"].x_range.follow is None
 
 
-def test_a_second_reader_gets_all_of_the_window_at_once(growing: Growing) -> None:
+def test_a_second_reader_gets_the_whole_window_at_once(growing: Growing) -> None:
     growing.to(1.0)
     other = Page(Document(), growing.feed)
     assert np.array_equal(
@@ -215,7 +215,7 @@ def test_several_slaves_are_shown_one_at_a_time(tmp_path: Path, grow: Grow) -> N
     assert "slave 'middle'" in growing.text
 
 
-def test_a_silent_recorder_is_said(growing: Growing) -> None:
+def test_a_silent_recorder_is_reported(growing: Growing) -> None:
     growing.to(0.5)
     assert "running" in growing.feed.state
     growing.clock.time += SILENT_NS + 1_000_000_000
@@ -226,7 +226,7 @@ def test_a_silent_recorder_is_said(growing: Growing) -> None:
     )  # a tile for each laboratory
 
 
-def test_a_state_is_said_with_its_age(growing: Growing) -> None:
+def test_a_state_is_shown_with_its_age(growing: Growing) -> None:
     growing.to(0.25)
     early = growing.feed.t
     growing.clock.time += 800_000_000
@@ -245,7 +245,7 @@ def test_a_state_is_said_with_its_age(growing: Growing) -> None:
     assert " ago" not in growing.text
 
 
-def test_an_emergency_stop_is_there_at_the_next_look_though_nothing_follows_it(
+def test_an_emergency_stop_is_shown_at_the_next_update_although_nothing_follows_it(
     short_plan: Plan, tmp_path: Path, grow: Grow
 ) -> None:
     path = tmp_path / "stopped.mcap"
@@ -272,7 +272,7 @@ def test_an_emergency_stop_is_there_at_the_next_look_though_nothing_follows_it(
     assert "emergency stop, t = 1.00 s" in text
 
 
-def test_a_cause_is_said_once_and_events_stand_in_the_order_of_time() -> None:
+def test_a_cause_is_shown_once_and_events_are_in_the_order_of_time() -> None:
     stops = [SimpleNamespace(text="The master was held up.")]
     feed: Any = SimpleNamespace(standing=SimpleNamespace(stops=stops), state="ended: The master was held up.")
     assert heading(feed) == "ended"
@@ -282,7 +282,7 @@ def test_a_cause_is_said_once_and_events_stand_in_the_order_of_time() -> None:
     assert re.findall(r"\d\.\d\d", listing(feed)) == ["2.67", "2.50", "2.38"]
 
 
-def test_the_banner_names_causes_and_not_what_followed_them() -> None:
+def test_the_banner_names_causes_and_not_their_consequences() -> None:
     standing = Standing(VirtualClock())
     event = {"t": 1.2, "level": "error", "values": {}}
     standing.event({**event, "lab": "slave", "code": "remote_trip", "text": "The master stopped the test"})
@@ -291,7 +291,7 @@ def test_the_banner_names_causes_and_not_what_followed_them() -> None:
     assert [(stop.lab, stop.text) for stop in standing.stops] == [("master", "too far")]
 
 
-def test_damage_is_said_and_what_came_before_stays(virtual_recording: Path, grow: Grow) -> None:
+def test_damage_is_reported_and_earlier_samples_stay(virtual_recording: Path, grow: Grow) -> None:
     content = bytearray(virtual_recording.read_bytes())
     content[content.index(b"\x28\xb5\x2f\xfd", len(content) // 2) + 9] ^= 0xFF  # within a compressed chunk
     growing = grow(bytes(content))
@@ -301,14 +301,14 @@ def test_damage_is_said_and_what_came_before_stays(virtual_recording: Path, grow
     assert growing.source("master")["t"].size > 10
 
 
-def test_what_is_no_recording_is_said(grow: Grow) -> None:
+def test_a_file_that_is_not_a_recording_is_reported_on_the_page(grow: Grow) -> None:
     growing = grow(b"no recording at all")
     growing.to(1.0)
     assert "is not a readable MCAP recording" in growing.feed.state
     assert growing.feed.ended
 
 
-def test_a_recording_without_plan_or_with_one_topic_is_shown_too(tmp_path: Path, grow: Grow) -> None:
+def test_a_recording_without_plan_or_with_one_topic_is_shown(tmp_path: Path, grow: Grow) -> None:
     path = tmp_path / "some.mcap"
     recording = Recording(path, "bench", 1, {"slave": TOPICS["slave"][:2]})
     for seq in range(200):
@@ -322,7 +322,7 @@ def test_a_recording_without_plan_or_with_one_topic_is_shown_too(tmp_path: Path,
     assert growing.feed.state == "ended: cut off"
 
 
-def test_a_file_of_a_test_before_is_not_shown(virtual_recording: Path, tmp_path: Path) -> None:
+def test_a_file_of_an_earlier_test_is_not_shown(virtual_recording: Path, tmp_path: Path) -> None:
     path = tmp_path / "old.mcap"
     path.write_bytes(virtual_recording.read_bytes())
     written = path.stat().st_mtime_ns
@@ -334,12 +334,12 @@ def test_a_file_of_a_test_before_is_not_shown(virtual_recording: Path, tmp_path:
         assert new.changes
 
 
-def test_the_text_of_an_event_is_no_markup() -> None:
+def test_the_text_of_an_event_does_not_become_markup() -> None:
     event = {"t": 1.0, "lab": "<b>", "level": "error", "code": "x", "text": "<script>alert(1)</script>"}
     feed: Any = SimpleNamespace(events=[event])
     assert "<script>" not in listing(feed)
     assert "&lt;script&gt;" in listing(feed)
 
 
-def test_the_classes_of_the_histogram_reach_around_the_interval(short_plan: Plan) -> None:
+def test_the_bins_of_the_histogram_extend_around_the_interval(short_plan: Plan) -> None:
     assert EDGES[0] < 1e6 * short_plan.test.interval < EDGES[-1]

@@ -18,7 +18,7 @@ def in_pieces(trace: Trace, cuts: list[int], values: np.ndarray) -> None:
 
 
 @given(cuts=st.lists(st.integers(0, 1000), max_size=20), step=st.integers(1, 30))
-def test_every_so_many_ticks_have_one_point_however_they_come(cuts: list[int], step: int) -> None:
+def test_one_point_is_kept_per_step_however_the_ticks_arrive(cuts: list[int], step: int) -> None:
     trace = Trace(step, 2000)
     in_pieces(trace, sorted(cuts), TICKS * 0.5)
     assert trace.since(0)["a"].tolist() == (TICKS[::step] * 0.5).tolist()
@@ -26,7 +26,9 @@ def test_every_so_many_ticks_have_one_point_however_they_come(cuts: list[int], s
 
 
 @given(cuts=st.lists(st.integers(0, 1000), max_size=20), step=st.integers(1, 30), seed=st.integers(0, 99))
-def test_the_worst_of_each_group_is_kept_however_it_comes(cuts: list[int], step: int, seed: int) -> None:
+def test_the_worst_value_of_each_group_is_kept_however_the_ticks_arrive(
+    cuts: list[int], step: int, seed: int
+) -> None:
     values = np.random.default_rng(seed).normal(size=TICKS.size)
     values[::7] = np.nan
     trace = Trace(step, 2000, largest)
@@ -61,7 +63,7 @@ def test_the_extremes_of_each_group_are_kept_with_their_times(cuts: list[int], s
                 assert np.nanmax(kept[name][here]) == np.nanmax(group)
 
 
-def test_a_reader_gets_what_is_new_to_it_and_no_more_than_is_kept() -> None:
+def test_a_reader_gets_the_points_that_are_new_to_it() -> None:
     trace = Trace(1, 10)
     trace.add(TICKS[:4], {"a": TICKS[:4]})
     assert trace.since(0)["a"].tolist() == [0, 1, 2, 3]

@@ -1,4 +1,4 @@
-"""The fragility fit against closed forms, chances that are known, and another optimiser."""
+"""The fragility fit, compared with closed forms, known probabilities, and another optimiser."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def drawn(median: float, dispersion: float, levels: Array, count: int, seed: int
     return intensity, intensity > capacity
 
 
-def test_two_intensities_have_the_curve_through_both_shares() -> None:
+def test_the_curve_of_two_intensities_passes_through_both_shares() -> None:
     intensity = np.repeat([1.0, 2.0], 10)
     passed = np.array([True] * 2 + [False] * 8 + [True] * 7 + [False] * 3)
     found = fit(intensity, passed)
@@ -30,7 +30,7 @@ def test_two_intensities_have_the_curve_through_both_shares() -> None:
     assert chance(found, np.array([1.0, 2.0])) == pytest.approx([0.2, 0.7], rel=1e-8)
 
 
-def test_the_fit_is_the_maximum_that_another_optimiser_finds() -> None:
+def test_the_fit_agrees_with_the_maximum_that_another_optimiser_finds() -> None:
     intensity, passed = drawn(0.8, 0.4, np.linspace(0.2, 2.0, 10), 30, 1)
     found = fit(intensity, passed)
     groups = stripes(intensity, passed)
@@ -45,7 +45,7 @@ def test_the_fit_is_the_maximum_that_another_optimiser_finds() -> None:
     assert found.dispersion == pytest.approx(math.exp(best.x[1]), rel=1e-5)
 
 
-def test_intervals_of_90_percent_hold_the_truth_nine_times_of_ten() -> None:
+def test_intervals_of_90_percent_cover_the_true_value_nine_times_of_ten() -> None:
     held = np.zeros(2)
     count = 300
     for seed in range(count):
@@ -69,13 +69,13 @@ def test_intervals_of_90_percent_hold_the_truth_nine_times_of_ten() -> None:
         ([True, True, False, False], "the chance does not grow with the intensity"),
     ],
 )
-def test_tests_without_a_curve_say_why(passed: list[bool], why: str) -> None:
+def test_a_fit_without_a_curve_states_the_reason(passed: list[bool], why: str) -> None:
     found = fit(np.array([1.0, 2.0, 3.0, 4.0]), np.array(passed))
     assert found.why_not == why
     assert math.isnan(found.median)
 
 
-def test_shares_that_follow_another_law_are_doubted_and_those_of_the_law_seldom() -> None:
+def test_shares_of_another_law_are_flagged_and_those_of_the_lognormal_law_seldom() -> None:
     levels = np.linspace(0.3, 1.8, 8)
     doubted = sum(fit(*drawn(0.8, 0.4, levels, 40, seed)).agreement < 0.05 for seed in range(200))
     assert doubted < 30  # of 200 at 5 %, with three standard errors and what small counts add

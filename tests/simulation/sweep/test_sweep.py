@@ -1,4 +1,4 @@
-"""The tests of a sweep are those that their plans describe, in the order of the file, and the same for all workers."""
+"""The tests of a sweep follow their plans, keep the order of the file, and do not depend on the workers."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_the_rows_are_the_tests_of_their_plans(file: Path, tmp_path: Path) -> None:
+def test_the_rows_of_a_sweep_equal_the_tests_of_their_plans(file: Path, tmp_path: Path) -> None:
     sweep = definition.load(file)
     made = table.table(tmp_path / "a.parquet", sweep, Way())
     assert made.num_rows == sweep.rows == 2 * 2 * 3 * 2
@@ -88,7 +88,7 @@ def test_the_rows_are_the_tests_of_their_plans(file: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("name", ["default", "single_site", "two_columns", "two_storeys"])
-def test_peaks_are_the_largest_of_the_magnitudes(name: str) -> None:
+def test_the_peaks_of_a_sweep_are_the_largest_magnitudes(name: str) -> None:
     plan = plans.load(ROOT / "rths" / "plans" / f"{name}.toml").with_ticks(400)
     rollout = simulate(plan, substructure.ground_rows(plan, substructure.motion(plan)), seed=1)
     columns = by_role(plan, rollout)
@@ -96,7 +96,7 @@ def test_peaks_are_the_largest_of_the_magnitudes(name: str) -> None:
     assert limited.peaks(plan, columns) == {name: float(np.max(values)) for name, values in every.items()}
 
 
-def test_the_same_bytes_for_one_worker_for_two_and_for_one_that_goes_on(
+def test_one_worker_two_workers_and_a_resumed_sweep_give_the_same_bytes(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(play, "SIZE", 64)
@@ -129,7 +129,9 @@ def test_the_same_bytes_for_one_worker_for_two_and_for_one_that_goes_on(
     assert parquet.read_table(paths[0]).column("row").to_pylist() == list(range(140))
 
 
-def test_files_travel_with_the_tests(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_files_of_a_sweep_are_sent_to_the_workers(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     given = luggage.packed(definition.load(file))
     shutil.rmtree(tmp_path / "records")
     file.unlink()
@@ -139,7 +141,7 @@ def test_files_travel_with_the_tests(file: Path, tmp_path: Path, monkeypatch: py
     assert found.columns["record"][0].startswith("file own.AT2, digest ")
 
 
-def test_a_loop_that_diverges_passes_every_limit() -> None:
+def test_a_loop_that_diverges_exceeds_every_limit() -> None:
     plan = plans.load(ROOT / "rths" / "plans" / "default.toml")
     changed = plans.from_tables(
         plan.written()
@@ -180,7 +182,7 @@ def test_spectral_acceleration_of_a_sine_at_resonance() -> None:
         ("draws = 1000000\nnoise = true\n[[motion]]\nscales = {from=0.1, to=1.0, count=99}\n", "at most 10,000,000"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_swept_is_said_in_one_sentence(change: str, complaint: str, tmp_path: Path) -> None:
+def test_a_wrong_sweep_is_refused_in_one_sentence(change: str, complaint: str, tmp_path: Path) -> None:
     file = tmp_path / "sweep.toml"
     file.write_text(change)
     with pytest.raises(InputError, match=complaint) as error:
@@ -189,7 +191,7 @@ def test_what_cannot_be_swept_is_said_in_one_sentence(change: str, complaint: st
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_what_was_found_of_another_plan_is_refused(tmp_path: Path) -> None:
+def test_a_reality_found_with_another_plan_is_refused_for_a_sweep(tmp_path: Path) -> None:
     (tmp_path / "found.toml").write_text("[found]\nmodels = '0123456789abcdef'\n")
     sweep = definition.from_tables({"reality": "found.toml"}, tmp_path)
     with pytest.raises(
@@ -198,7 +200,7 @@ def test_what_was_found_of_another_plan_is_refused(tmp_path: Path) -> None:
         table.table(tmp_path / "a.parquet", sweep, Way())
 
 
-def test_the_tests_of_a_reality_are_those_of_its_laboratories(tmp_path: Path) -> None:
+def test_a_sweep_with_a_reality_runs_in_its_laboratories(tmp_path: Path) -> None:
     text = "[[effect]]\nname = 'column.friction'\nforce = 900.0\n"
     (tmp_path / "hidden.toml").write_text(text)
     brief = {"parameters": {"test.duration": [2.0]}, "motion": [{"scales": [0.2]}]}

@@ -1,4 +1,4 @@
-"""What a Dask cluster lacks is said in one sentence; tests/system/test_cluster.py kills its workers."""
+"""Faults of a Dask cluster are reported in one sentence; tests/system/test_cluster.py kills its workers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,9 @@ def test_a_worker_of_another_version_is_named() -> None:
         (InputError("Test 3 of the sweep: no."), InputError, "Test 3 of the sweep: no."),
     ],
 )
-def test_what_failed_is_one_sentence(error: BaseException, kind: type[Exception], said: str) -> None:
+def test_a_failed_task_is_reported_in_one_sentence(
+    error: BaseException, kind: type[Exception], said: str
+) -> None:
     with pytest.raises(kind, match=said):
         cluster.result(Failed(error), ADDRESS)
 
@@ -56,13 +58,13 @@ def test_a_task_that_ends_its_workers_is_given_up() -> None:
         cluster.result(Failed(distributed.KilledWorker("task", last, 3)), ADDRESS)
 
 
-def test_a_scheduler_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_absent_scheduler_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "REACH", 0.3)
     with pytest.raises(InputError, match=f"Cannot reach the Dask scheduler at {ADDRESS}"):
         list(spread(abs, [1], dask=ADDRESS))
 
 
-def test_a_scheduler_without_workers_is_said_and_one_with_a_worker_computes(
+def test_a_scheduler_without_workers_is_reported_and_one_with_a_worker_computes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(cluster, "REACH", 5.0)

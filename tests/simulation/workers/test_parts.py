@@ -1,4 +1,4 @@
-"""The rows of a table that are done stay, whatever ends the process that computes the others."""
+"""Finished rows of a table are kept, whatever ends the process that computes the others."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def made(
     return path.read_bytes()
 
 
-def test_a_table_is_whole_in_order_and_leaves_nothing_else(tmp_path: Path) -> None:
+def test_a_table_is_complete_and_in_order_and_leaves_no_other_file(tmp_path: Path) -> None:
     made(tmp_path / "a.parquet")
     table = parquet.read_table(tmp_path / "a.parquet")
     assert table.column("row").to_pylist() == list(range(15))
@@ -48,7 +48,7 @@ def test_a_table_is_whole_in_order_and_leaves_nothing_else(tmp_path: Path) -> No
     assert [path.name for path in tmp_path.iterdir()] == ["a.parquet"]
 
 
-def test_what_was_computed_before_is_not_computed_again(tmp_path: Path) -> None:
+def test_finished_rows_are_not_computed_again(tmp_path: Path) -> None:
     whole = made(tmp_path / "a.parquet")
     with pytest.raises(KeyboardInterrupt):
         made(tmp_path / "b.parquet", until(3))
@@ -62,7 +62,7 @@ def test_what_was_computed_before_is_not_computed_again(tmp_path: Path) -> None:
     assert again == [3, 4]
 
 
-def test_a_part_that_was_being_written_is_no_part(tmp_path: Path) -> None:
+def test_a_part_that_was_being_written_is_ignored(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         made(tmp_path / "b.parquet", until(2))
     folder = tmp_path / "b.parquet.parts"
@@ -71,14 +71,14 @@ def test_a_part_that_was_being_written_is_no_part(tmp_path: Path) -> None:
     assert not (folder / "0000002.new").exists()
 
 
-def test_a_batch_that_comes_twice_is_there_once(tmp_path: Path) -> None:
+def test_a_batch_that_is_added_twice_is_kept_once(tmp_path: Path) -> None:
     with parts(tmp_path / "a.parquet", ABOUT, SCHEMA, 1) as found:
         found.add(batch(0))
         found.add(batch(0))
         assert found.table().num_rows == 3
 
 
-def test_an_error_before_the_first_batch_leaves_nothing(tmp_path: Path) -> None:
+def test_an_error_before_the_first_batch_leaves_no_file(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         made(tmp_path / "a.parquet", until(0))
     assert list(tmp_path.iterdir()) == []

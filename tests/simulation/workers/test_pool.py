@@ -34,16 +34,16 @@ def killed(_: int) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_work_is_spread_over_processes_of_which_ctrl_c_is_not_for() -> None:
+def test_worker_processes_ignore_ctrl_c() -> None:
     assert list(spread(hears_ctrl_c, range(4), jobs=2)) == [False] * 4
     assert hears_ctrl_c(0)
 
 
-def test_one_job_needs_no_process() -> None:
+def test_a_single_job_runs_without_worker_processes() -> None:
     assert list(spread(abs, [-3, 2], jobs=1)) == [3, 2]
 
 
-def test_work_that_nobody_wants_any_more_is_not_waited_for() -> None:
+def test_work_whose_results_are_no_longer_read_is_not_waited_for() -> None:
     began = time.monotonic()
     results = over_processes(time.sleep, [0.0, 0.0, 100.0, 100.0], 2)
     next(results)
@@ -51,7 +51,7 @@ def test_work_that_nobody_wants_any_more_is_not_waited_for() -> None:
     assert time.monotonic() - began < 60.0
 
 
-def test_a_killed_worker_loses_and_doubles_nothing(tmp_path: Path) -> None:
+def test_a_killed_worker_loses_no_item_and_repeats_none(tmp_path: Path) -> None:
     items = [(number, str(tmp_path / "mark")) for number in range(12)]
     assert sorted(spread(killed_once, items, jobs=2)) == list(range(12))
     assert (tmp_path / "mark").exists()
@@ -64,6 +64,6 @@ def test_an_item_that_ends_every_worker_is_given_up() -> None:
         list(spread(killed, [1], jobs=2))
 
 
-def test_values_that_cannot_be_used_are_said() -> None:
+def test_unusable_numbers_of_jobs_are_refused() -> None:
     with pytest.raises(InputError, match="--jobs is 0, but must be at least 1, or -1 for all processors."):
         check(0, "")

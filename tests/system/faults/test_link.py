@@ -62,7 +62,7 @@ def heard_after(listener: Process, since: float) -> float:
     )
 
 
-def test_f05_a_short_black_hole(machines: Network, tmp_path: Path) -> None:
+def test_f05_a_short_outage_without_notice(machines: Network, tmp_path: Path) -> None:
     def scenario(folder: Path) -> None:
         with Bench(folder, machines.place("tcp")).start_all() as bench:
             try:
@@ -80,7 +80,7 @@ def test_f05_a_short_black_hole(machines: Network, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("protocol", ["tcp", "udp"])
-def test_f06_after_a_black_hole_of_500_ms_nothing_moves(
+def test_f06_after_an_outage_of_500_ms_nothing_moves(
     protocol: str, machines: Network, tmp_path: Path
 ) -> None:
     def scenario(folder: Path) -> None:
@@ -127,7 +127,7 @@ def test_f07_f08_an_outage_longer_than_the_lease_needs_a_reset(machines: Network
     undisturbed(scenario, tmp_path)
 
 
-def test_f09_a_flapping_link_is_back_soon(machines: Network, tmp_path: Path) -> None:
+def test_f09_a_flapping_link_recovers_soon(machines: Network, tmp_path: Path) -> None:
     def scenario(folder: Path) -> None:
         with Bench(folder, machines.place("udp")).start_all() as bench:
             listener = ear(bench, *inside(machines.master))
@@ -226,7 +226,7 @@ def test_f17_flipped_bits_in_the_headers_of_zenoh(tmp_path: Path) -> None:
     undisturbed(scenario, tmp_path)
 
 
-def test_f35_a_stop_that_is_lost_is_made_good_by_the_watchdog(tmp_path: Path) -> None:
+def test_f35_the_watchdog_acts_when_a_stop_is_lost(tmp_path: Path) -> None:
     mark = bytes([0x94, KINDS[Stop], 0xCF])  # a frame of four items, its kind, a session of 64 bits
     lost: list[float] = []
 

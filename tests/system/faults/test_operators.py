@@ -126,7 +126,7 @@ def by_log(bench: Bench, killed: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("lab", LABS)
-def test_f54_the_red_button_of_one_laboratory_stops_both(lab: str, tmp_path: Path) -> None:
+def test_f54_an_emergency_stop_at_one_laboratory_stops_both(lab: str, tmp_path: Path) -> None:
     other = next(name for name in LABS if name != lab)
 
     def scenario(folder: Path) -> None:
@@ -159,7 +159,7 @@ def test_f54_the_red_button_of_one_laboratory_stops_both(lab: str, tmp_path: Pat
     undisturbed(scenario, tmp_path)
 
 
-def test_f55_a_reset_needs_a_new_press_and_the_cause_gone(tmp_path: Path) -> None:
+def test_f55_a_reset_needs_the_cause_to_be_gone_and_a_new_press(tmp_path: Path) -> None:
     def scenario(folder: Path) -> None:
         with Bench(folder).start_all() as bench:
             bench.want("slave", Wish.READ_FAR)

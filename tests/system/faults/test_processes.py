@@ -32,7 +32,7 @@ def test_f20_a_killed_slave_brings_the_master_to_rest(tmp_path: Path) -> None:
     undisturbed(scenario, tmp_path)
 
 
-def test_f21_a_master_that_is_held_up_finds_both_at_rest(tmp_path: Path) -> None:
+def test_f21_a_paused_master_finds_both_laboratories_at_rest(tmp_path: Path) -> None:
     def scenario(folder: Path) -> None:
         with Bench(folder) as bench:
             bench.start_all()
@@ -56,7 +56,7 @@ def test_f21_a_master_that_is_held_up_finds_both_at_rest(tmp_path: Path) -> None
     undisturbed(scenario, tmp_path)
 
 
-def test_f15_a_slave_that_was_held_up_uses_no_stale_command(tmp_path: Path) -> None:
+def test_f15_a_slave_uses_no_stale_command_after_a_pause(tmp_path: Path) -> None:
     def scenario(folder: Path) -> None:
         with Bench(folder) as bench:
             bench.start_all()

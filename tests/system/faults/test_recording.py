@@ -20,7 +20,7 @@ QUIET = 2.0  # s without strangers
 DOUBLES = 6.0  # s for a second slave and a second master
 
 
-def test_f47_f51_neither_a_slow_disk_nor_strangers_hold_up_the_loop(tmp_path: Path) -> None:
+def test_f47_f51_neither_a_slow_disk_nor_strangers_delay_the_loop(tmp_path: Path) -> None:
     def scenario(folder: Path) -> None:
         slow = "tests.system.faults.slow_recorder"
         with Bench(

@@ -22,7 +22,7 @@ WAIT_S = 10.0
 TEST = "strangers"
 
 
-def test_connections_that_say_nothing_do_not_keep_others_out() -> None:
+def test_silent_connections_do_not_keep_others_out() -> None:
     endpoint = listenable()
     master = ZenohLink("master", TEST, listen=endpoint)
     try:
@@ -49,7 +49,7 @@ def nobody(_role: str) -> Identity | None:
 
 
 @pytest.mark.parametrize("scheme", ["tcp", "tls"])
-def test_a_message_larger_than_any_frame_is_not_put_together(scheme: str, tmp_path: Path) -> None:
+def test_a_message_larger_than_any_frame_is_not_assembled(scheme: str, tmp_path: Path) -> None:
     who: Callable[[str], Identity | None] = nobody
     if scheme == "tls":
         made(tmp_path / "keys")

@@ -75,7 +75,9 @@ def wait_for(path: Path, word: str) -> None:
         time.sleep(0.05)
 
 
-def test_a_killed_rig_ends_the_test_in_a_sentence_and_both_laboratories_come_to_rest(tmp_path: Path) -> None:
+def test_a_killed_rig_ends_the_test_with_one_sentence_and_both_laboratories_come_to_rest(
+    tmp_path: Path,
+) -> None:
     def scenario(folder: Path) -> None:
         with running(folder) as (test, rig, _):
             rig.kill()
