@@ -150,7 +150,10 @@ CLIENT = (
         "client_wait", "s", "from that force handed over to the client's next displacement; NaN where none"
     ),
     Signal(
-        "client_late", "", "the client's next displacement had not come in the tick's time", FieldType.FLAG
+        "client_late",
+        "",
+        "the client had time for its next displacement, and it had not come",
+        FieldType.FLAG,
     ),
     Signal("wake_lateness", "s", "start of the tick after its nominal time"),
 )

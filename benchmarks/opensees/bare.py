@@ -1,7 +1,8 @@
-"""`python -m benchmarks.opensees.bare PORT STEPS INTERVAL`: bare TCP under the same client, every INTERVAL s.
+"""`python -m benchmarks.opensees.bare PORT STEPS INTERVAL SHARE`: bare TCP under the same client, every INTERVAL s.
 
 It sends an answer of the same size where `rths serve` hands a force over, and waits for the client's next displacement,
-with the same answers between them: no laboratory, no checks, no recording. Prints the times in between, s, as JSON.
+with the same answers between them: no laboratory, no checks, no recording. Prints the times in between, s, as JSON, and
+in how many ticks the displacement had not come after SHARE of the interval, by the rule of `rths serve`.
 """
 
 from __future__ import annotations
@@ -46,9 +47,16 @@ def until_asked(link: socket.socket, place: float) -> tuple[float, int]:
             return place, came
 
 
+def missed(tick: int, handed: int, came: int, interval: int, share: int) -> int:
+    """The ticks, from `tick` on, that end before a displacement came though the client had half of the share (ns)."""
+    fair = -((share // 2 - handed) // interval)  # the first tick in which it had
+    return max(0, (came - share) // interval - max(tick, fair) + 1)
+
+
 def main() -> int:
     """Serve one client."""
     port, steps, interval = int(sys.argv[1]), int(sys.argv[2]), round(float(sys.argv[3]) * 1e9)
+    share = round(float(sys.argv[4]) * interval)
     realtime.prepare("auto", None)
     with socket.create_server(("127.0.0.1", port)) as server:
         link, _ = server.accept()
@@ -57,17 +65,20 @@ def main() -> int:
         link.recv(44, socket.MSG_WAITALL)
         link.setblocking(False)
         place, _ = until_asked(link, 0.0)
-        start, waits = time.monotonic_ns(), []
-        for tick in range(1, steps):
+        start, waits, tick, late = time.monotonic_ns(), [], 0, 0
+        for _ in range(1, steps):
+            tick += 1
             time.sleep(max(start + tick * interval - time.monotonic_ns(), 0) * 1e-9)
             handed = time.monotonic_ns()
             link.send(bytes(SIZE))
             place, came = until_asked(link, place)
             waits.append((came - handed) * 1e-9)
+            behind = missed(tick, handed - start, came - start, interval, share)
+            tick, late = tick + behind, late + behind
         link.send(bytes(SIZE))
         while link.recv(SIZE) if select.select([link], [], [], 0.2)[0] else b"":
             pass
-    sys.stdout.write(json.dumps(waits) + "\n")
+    sys.stdout.write(json.dumps({"waits": waits, "late": late}) + "\n")
     return 0
 
 

@@ -110,7 +110,8 @@ class ClientBuilding(BuildingStep):
                 self._hand_back(tick, position, force, forces)
         if not self._moving:
             self._fetch(tick)
-        self._late = not (self._moving or self._over)
+        waited = not (self._moving or self._over)
+        self._late = waited and self._pace.fair(self._lab, tick, self._handed_ns)
         if not self._moving:
             self._outputs = self._outputs._replace(target=self._own.target if self._own else 0.0, held=True)
             return self._outputs

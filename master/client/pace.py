@@ -24,6 +24,9 @@ class Pace(Protocol):
     def until(self, lab: Laboratory, tick: int) -> Callable[[], float]:
         """A function that returns the remaining time (s) to wait in a tick; 0 or less if it has passed."""
 
+    def fair(self, lab: Laboratory, tick: int, since_ns: int) -> bool:
+        """Whether a client that has its forces since `since_ns` has the time for an answer in this tick."""
+
     def over(self) -> None:
         """Called when that time has passed; raises ClientError if that ends the test at once."""
 
@@ -41,6 +44,10 @@ class RealTime:
         """The remaining part of the plan's share of the interval, which begins at the tick's nominal time."""
         now, end = lab.clock.now, lab.tick_ns(tick) + self._share_ns
         return lambda: (end - now()) * 1e-9
+
+    def fair(self, lab: Laboratory, tick: int, since_ns: int) -> bool:
+        """Whether the client has half of the share at least; with less the tick is late, and not the client."""
+        return lab.tick_ns(tick) + self._share_ns // 2 >= since_ns
 
     def over(self) -> None:
         """Do nothing: the laboratories hold, and the watchdog decides when to ramp."""
@@ -61,6 +68,10 @@ class AsFastAsItGoes:
         """The remaining time, in slices so that a request to stop is noticed."""
         end = time.monotonic() + self._seconds
         return lambda: 0.0 if self._stopping() else min(end - time.monotonic(), SLICE_S)
+
+    def fair(self, lab: Laboratory, tick: int, since_ns: int) -> bool:
+        """True, because time stands still."""
+        return True
 
     def over(self) -> None:
         """End the test, because the client sends nothing."""

@@ -1,4 +1,4 @@
-"""Late ticks of a recording: their number, the most in any window, and their meaning for the result."""
+"""Late ticks of a recording: their number, the most in any window, their cause, and their meaning for the result."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from common.host.lateness import MOST, WINDOW
 from common.recording.run import Run
-from common.roles import LATENCY, kind_of
+from common.roles import LATENCY, MASTER, kind_of
 
 
 def late_ticks(run: Run) -> dict[str, Any] | None:
@@ -28,6 +28,36 @@ def late_ticks(run: Run) -> dict[str, Any] | None:
     counted = np.concatenate([[0], np.cumsum(late)])
     within = counted[1:] - counted[np.maximum(np.arange(1, ticks + 1) - WINDOW, 0)]
     return {"late": int(late.sum()), "ticks": ticks, "worst": int(within.max()), "window": WINDOW}
+
+
+def beside_client(run: Run) -> dict[str, int] | None:
+    """The late ticks of a test in real time whose building is a client's, by cause; None for other tests.
+
+    `client_late` of the `ticks` held the laboratories because the client's displacement had not come in time;
+    `woke_late` began a whole interval or more after their time, which is the machine's lateness and not the client's.
+    """
+    columns = run.columns.get(MASTER, {})
+    if not {"client_late", "wake_lateness"} <= columns.keys() or not np.any(columns["wake_lateness"]):
+        return None
+    t = columns["t"]
+    interval = float(np.median(np.diff(t))) if t.size > 1 else np.inf
+    return {
+        "ticks": int(t.size),
+        "client_late": int(np.count_nonzero(columns["client_late"])),
+        "woke_late": int(np.count_nonzero(columns["wake_lateness"] >= interval)),
+    }
+
+
+def said_beside_client(found: dict[str, int] | None) -> str:
+    """The sentence on late ticks beside a client; empty for other tests."""
+    if found is None:
+        return ""
+    ticks = found["ticks"]
+    held, woke = (f"{found[name]} ({found[name] / ticks:.2%})" for name in ("client_late", "woke_late"))
+    return (
+        f"Of {ticks} ticks {held} had no displacement of the client in time, and {woke} began late by an interval or "
+        "more."
+    )
 
 
 def warning(found: dict[str, Any] | None) -> str:

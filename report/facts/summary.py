@@ -68,6 +68,7 @@ def summarize(run: Run) -> dict[str, Any]:
         "latency": latencies(run),
         "late_ticks": late_ticks(run),
         "real_time": real_time,
+        "beside_client": lateness.beside_client(run),
         "warnings": [text for text in (lateness.warning(real_time),) if text],
         "patience": patience(run),
         "missed_ticks": missed_ticks(run),

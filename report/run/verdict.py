@@ -11,6 +11,7 @@ from common.plan.plan import Plan
 from common.recording.run import Run
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
 from report.facts.laboratories import LaboratoryFacts, laboratories, whole_plan
+from report.facts.late import said_beside_client
 from report.text.force_path import sentence as force_sentence
 from report.text.formats import apart, milliseconds, quantity
 
@@ -132,10 +133,10 @@ def rejected(summary: Summary) -> str:
 
 
 def lateness(run: Run, summary: Summary) -> str:
-    """Ticks in which a deadline was missed."""
+    """Ticks in which a deadline was missed, or the displacement of the building's client."""
     late, missed = summary["late_ticks"], summary["missed_ticks"]
     if late is None or (not late and not summary["latency"]):
-        return ""
+        return said_beside_client(summary["beside_client"])
     ticks = max(run.ticks(topic) for topic in run.columns if kind_of(topic) == LATENCY)
     return f"{late} of {ticks} ticks were late, {missed} of them missed altogether."
 

@@ -10,6 +10,7 @@ from typing import Any
 from common.recording.outcome import COMPLETED, CUT_OFF, outcome
 from common.terminal import cli
 from common.terminal.printable import all_shown
+from report.facts.late import said_beside_client
 from report.text.formats import apart, fixed, milliseconds, modes, reading, storey_rows, tracked
 from report.text.progress import Progress
 from report.text.terminal import table
@@ -181,3 +182,5 @@ def write_latency(summary: dict[str, Any]) -> None:
         sys.stdout.write(
             f"late ticks: {summary['late_ticks']}, missed altogether: {summary['missed_ticks']}\n"
         )
+    if said := said_beside_client(summary["beside_client"]):
+        sys.stdout.write(f"{said}\n")

@@ -67,3 +67,19 @@ def test_without_recorded_latency_late_ticks_are_not_mentioned(virtual_recording
     columns = {topic: values for topic, values in run.columns.items() if topic != "latency"}
     assert late.late_ticks(replace(run, columns=columns)) is None
     assert late.warning(None) == ""
+
+
+def test_beside_a_client_late_ticks_are_counted_by_cause(virtual_recording: Path, capsys: Any) -> None:
+    run = read(virtual_recording)
+    ticks = len(run.columns["master"]["t"])
+    woke, late = np.full(ticks, 80e-6), np.zeros(ticks, dtype=bool)
+    woke[100:104], late[10:12] = 2.1e-3, True
+    of = run.columns["master"] | {"client_late": late, "wake_lateness": woke}
+    columns = {topic: values for topic, values in run.columns.items() if topic != "latency"}
+    summary = summarize(replace(run, columns=columns | {"master": of}))
+    assert summary["beside_client"] == {"ticks": 2000, "client_late": 2, "woke_late": 4}
+    inspect.write_report(summary)
+    said = "Of 2000 ticks 2 (0.10%) had no displacement of the client in time, and 4 (0.20%) began late by an interval"
+    assert said in capsys.readouterr().out
+    assert said in verdict.lateness(run, summary)
+    assert summarize(run)["beside_client"] is None

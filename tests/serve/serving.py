@@ -57,6 +57,10 @@ class Ticking(Pace):
         end = time.monotonic() + self._seconds
         return lambda: end - time.monotonic()
 
+    def fair(self, lab: Laboratory, tick: int, since_ns: int) -> bool:
+        """The share is whole at the begin of each tick."""
+        return True
+
     def over(self) -> None:
         """The watchdog counts."""
 
