@@ -167,13 +167,19 @@ def together(more: Sequence[Record]) -> list[str]:
 
 
 def of_plan(record: Record) -> list[str]:
-    """A sentence where the recording was made under another plan."""
-    if not record.other_plan:
-        return []
-    return [
-        "The plan given has another structure, compensation or control than the recording's own plan: "
-        "the response gap includes this difference."
-    ]
+    """A sentence where the recording was made under another plan, and one where it is judged up to a hold only."""
+    found = []
+    if record.other_plan:
+        found.append(
+            "The plan given has another structure, compensation or control than the recording's own plan: "
+            "the response gap includes this difference."
+        )
+    if record.held is not None:
+        found.append(
+            f"The test was held at {record.held:.3f} s: what is judged lies before, because from there on forces "
+            "were not measured at the rate of the test."
+        )
+    return found
 
 
 def repeating(held: Mapping[str, float]) -> list[str]:

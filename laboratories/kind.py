@@ -118,6 +118,24 @@ class Machine(NamedTuple):
     drive: str = ""  # command without which it does not move; empty: it always moves
 
 
+class Moving(NamedTuple):
+    """The motion of a laboratory whose transfer system is to be brought to a standstill."""
+
+    velocity: float  # of its target, m/s
+    effort: float  # commanded force of its motor, N
+    measured: tuple[float, ...]
+    rates: tuple[float, ...]  # of the measured channels, per s
+    duration: float  # of the ramp to standstill, s
+
+
+class Coasting(NamedTuple):
+    """What a laboratory goes on doing when its transfer system stands still."""
+
+    channel: str  # measured channel that moves farthest compared with its limit, empty for none
+    peak: float  # largest magnitude that it reaches
+    energy: float  # of the motion and of the work at that rate that the building then lacks, J at its scale
+
+
 class Kind(ABC):
     """One kind of laboratory. A kind of a user's is a subclass of `laboratories.device.Device` in a file of its own."""
 
@@ -203,6 +221,20 @@ class Kind(ABC):
     def limits(self, plan: Plan) -> Mapping[str, float]:
         """Largest magnitudes by signal, and by the names in `limited`; a signal that is not in it has no limit."""
         return dict(vars(plan.limits))
+
+    def coasting(self, plan: Plan, moving: Moving) -> Coasting | None:
+        """What it goes on doing when its transfer system is brought to a standstill; None where that is not known.
+
+        A specimen between two floors comes to rest with its transfer system. What it lacks then is the work of its
+        nominal dashpot over the ramp and the kinetic energy of its nominal mass. A device on a floor moves on its own,
+        and only its kind knows how.
+        """
+        coupling = self.coupling(plan)
+        if coupling.follows is not Follows.DRIFT:
+            return None
+        rate = moving.velocity / coupling.ratio
+        energy = rate**2 * (coupling.damping * moving.duration + 0.5 * coupling.mass)
+        return Coasting("", 0.0, energy)
 
     @abstractmethod
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> Ramp:

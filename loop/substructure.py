@@ -210,6 +210,24 @@ def advance(building: Substructure, tick: int, position: float, force: float) ->
     `position` (m) and `force` (N) are those of the master's own laboratory measured at t_k; the slaves' forces, each at
     its own scale, must have been given to `receive`. The state advances by one interval.
     """
+    compute(building, tick, force)
+    if building.codes[OWN]:
+        actuate(building, position)
+
+
+@jit
+def enter_building(building: tuple[Any, ...], tick: int, force: float) -> None:
+    """`compute` for a caller outside compiled code, which holds the building as `compiled.plain` gives it."""
+    whole = Substructure(Compensator(*building[0]), *building[1:])
+    compute(whole, tick, force)
+
+
+@jit
+def compute(building: Substructure, tick: int, force: float) -> None:
+    """A tick without the compensator of the master's own laboratory; its values at the interval's end go into `asked`.
+
+    Otherwise as `advance`.
+    """
     codes, scalars, state, output = building.codes, building.scalars, building.state, building.output
     ground, own = building.ground, codes[OWN]
     if own:
@@ -220,7 +238,8 @@ def advance(building: Substructure, tick: int, position: float, force: float) ->
     integrators.step(codes[INTEGRATOR], building.coefficients, state, building.balance, interval)
     output[GROUND_ACCELERATION] = ground[0, tick]
     if own:
-        actuate(building, tick, position)
+        output[TARGET] = building.asked[SENT_TARGET]
+        tell(building, 0, tick, building.asked, 0)
     for lab in range(own, building.labs.shape[1]):
         tell(building, lab, tick, output, OF_SLAVES + SENT_VALUES * (lab - own))
     n = building.mass.size
@@ -278,19 +297,16 @@ def equilibrate(building: Substructure, tick: int) -> None:
 
 
 @jit
-def actuate(building: Substructure, tick: int, measured: float) -> None:
-    """Write target, command and effort of the master's own laboratory into `output`; `measured` is its position, m."""
+def actuate(building: Substructure, measured: float) -> None:
+    """Write command and effort of the master's own laboratory into `output`; `measured` is its position, m."""
     asked, output = building.asked, building.output
-    present = asked[SENT_TARGET]
-    tell(building, 0, tick, asked, 0)
     wanted = Wanted(
         asked[SENT_TARGET],
         asked[SENT_VELOCITY],
         asked[SENT_ACCELERATION],
         asked[SENT_JERK],
-        present,
+        output[TARGET],
         measured,
     )
-    output[TARGET] = present
     output[COMMAND] = compensators.step(building.compensator, wanted, building.scalars[INTERVAL])
     output[EFFORT] = asked[SENT_EFFORT]

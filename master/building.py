@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
+from common.earthquake_time import EarthquakeTime
 from common.lab.laboratory import Laboratory
 from common.protocol.messages import Feedback
 from common.roles import CLIENT
@@ -27,6 +28,7 @@ class Outputs(NamedTuple):
     sent: Sequence[Sent]  # to each slave, in the plan's order
     storeys: Sequence[float]  # signal by signal (`common.signals.OF_STOREYS`) the values of all storeys
     held: bool = False  # whether every laboratory keeps its present command
+    rate: float = 1.0  # at which the earthquake's time passes, below 1 around a hold
 
     @property
     def of_storeys(self) -> dict[str, Sequence[float]]:
@@ -46,6 +48,8 @@ class BuildingStep:
     """Computes from the measurements of a tick what the laboratories do in the coming interval."""
 
     who = CLIENT  # in messages, and the code of the event that says why it cannot continue
+    time: EarthquakeTime | None = None  # of a building that can be held
+    unheld = "its building is computed by another program, whose time goes on"  # why it cannot, if so
 
     def join(self, lab: Laboratory, partners: Sequence[Answering]) -> None:
         """Receive the master's laboratory, with its clock, and the slaves; called before the handshake."""
@@ -64,6 +68,15 @@ class BuildingStep:
         Raises:
             InterlockError, LostError: the building cannot continue.
         """
+        raise NotImplementedError
+
+    def hold(self, tick: int) -> None:
+        """Let the earthquake's time slow down to standstill from a tick on; only where there is a `time`."""
+        raise NotImplementedError
+
+    @property
+    def told(self) -> Sent:
+        """The values for the master's own laboratory at the end of the interval; only where there is a `time`."""
         raise NotImplementedError
 
     def written(self, tick: int) -> None:

@@ -6,7 +6,7 @@ import math
 import struct
 from collections.abc import Callable
 from operator import itemgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from loop.nominal.partition import drifts, felt, storey_stiffness
 from master.building import Outputs
 from models import energy_balance
 from models.compiled import bound
-from models.energy_balance import DRIFT_SHARE, ERROR_SHARE
+from models.energy_balance import DRIFT_SHARE, ERROR, ERROR_SHARE, LARGEST_INPUT
 
 # Share of the limit of displacement at which the floor of the energy input is reached: with less motion than 1 % of it,
 # 1.5 mm by default, sensor noise would dominate the shares.
@@ -29,11 +29,21 @@ LIMITED = (
 )  # the limits of both shares, in the order of the kernel's `most`
 
 
+class Energies(NamedTuple):
+    """Energies of a running test, J."""
+
+    given: float  # put in by the ground, with the floor by which errors are divided
+    spare: float  # of errors, which the limit `error_energy` allows at present
+
+
+UNKNOWN = Energies(math.inf, math.inf)  # of a building that the master does not compute
+
+
 class EnergyMonitor:
     """The energy balance of one test, and its limits `error_energy` and `numerical_drift`."""
 
     def __init__(self, plan: Plan) -> None:
-        self._limits, self._motions = vars(plan.limits), 3 * plan.storeys
+        self._plan, self._limits, self._motions = plan, vars(plan.limits), 3 * plan.storeys
         ratio, scale, self._felt = interface(kinds.own(plan), plan)
         self._balance = energy_balance.build(
             plan.test.interval,
@@ -43,6 +53,7 @@ class EnergyMonitor:
             np.array(plan.structure.mass),
             np.array([self._limits[name] for name in LIMITED]),
         )
+        self._interval, self._rate = plan.test.interval, 1.0
         self._take = bound(energy_balance.enter, self._balance, 0.0, 0.0, 0.0, 0.0)
         # displacements, velocities and accelerations are the first rows of `motion`
         self._fill, self._motion = struct.Struct(f"{self._motions}d").pack_into, self._balance.motion.data
@@ -53,12 +64,22 @@ class EnergyMonitor:
         return self._balance.sums.item(ERROR_SHARE)
 
     @property
+    def energies(self) -> Energies:
+        """The energy put in so far, and the energy of errors that the plan allows beyond that so far."""
+        given = floor(self._plan) + self._balance.sums.item(LARGEST_INPUT)
+        most = self._plan.limits.error_energy * given
+        return Energies(float(given), float(most - abs(self._balance.sums.item(ERROR))))
+
+    @property
     def numerical_drift(self) -> float:
         """Energy made by the integration, over that of the ground."""
         return self._balance.sums.item(DRIFT_SHARE)
 
     def violation(self, measured: tuple[float, ...], outputs: Outputs) -> LimitViolation | None:
         """Update the sums by one tick; returns the first of them beyond its limit, or None."""
+        if outputs.rate != self._rate:
+            self._rate = outputs.rate
+            self._balance.fixed[energy_balance.INTERVAL] = self._interval * outputs.rate
         self._fill(self._motion, 0, *outputs.storeys[: self._motions])
         position, force = self._felt(measured)
         if self._take(outputs.ground_acceleration, outputs.target, position, force):

@@ -10,7 +10,7 @@ from common.signals import OF_STOREYS
 from laboratories import kinds
 from laboratories.limits import TickLimits, limited, of_commands, of_readings, of_sent
 from master.building import Outputs
-from master.energy import EnergyMonitor
+from master.energy import UNKNOWN, Energies, EnergyMonitor
 
 
 class MasterLimits:
@@ -30,6 +30,11 @@ class MasterLimits:
         self._energy = None if plan.served else EnergyMonitor(plan)
         self.written = self._tick.written
         self.standing = self._tick.standing
+
+    @property
+    def energies(self) -> Energies:
+        """The energy put in, and that of errors which the plan allows at present."""
+        return self._energy.energies if self._energy else UNKNOWN
 
     def violation(
         self, measured: tuple[float, ...], wanted: tuple[float, ...], outputs: Outputs

@@ -41,6 +41,7 @@ from laboratories import kinds
 from laboratories.longest import resting
 from master.building import BuildingStep, Outputs
 from master.handshake import START_S, MasterHandshake
+from master.holding import Holding, Motion
 from master.limits import MasterLimits
 from master.own import OwnLaboratory
 from master.partner import Partner
@@ -76,6 +77,8 @@ class MasterLoop(RigLoop):
         self._command = self._own.zero
         self._drift = 0.0
         self._measured: tuple[float, ...] = ()
+        self._before: tuple[float, ...] = ()  # measured a tick earlier
+        self._holding = Holding(lab, building, self._together, self._limits)
         self._sent_ns = 0  # when the newest command went out
         self._digest = plan.digest()
         # the rest of an interval after the share for which a slave waits
@@ -185,7 +188,9 @@ class MasterLoop(RigLoop):
             self._sample(tick, measured, outputs)
         self.ticks = tick + 1
         self._drift = self._own.drift(outputs)
-        self._measured = measured
+        self._before, self._measured = self._measured, measured
+        if self._holding.active:
+            self._holding.follow(tick, self._motion)
         self._watch(tick, wake)
         if lab.running:
             self._settle(tick)
@@ -280,6 +285,21 @@ class MasterLoop(RigLoop):
         elif now - lab.recorder_heard_ns > lab.plan.recording.patience * 1e9:
             lab.lost("The recorder", lab.plan.recording.patience, tick)
 
+    # -- hold ---------------------------------------------------------------------------------------
+
+    @property
+    def _motion(self) -> Motion:
+        """The newest measurements of the master's own laboratory."""
+        return Motion(self._measured, self._before, self._own.force(self._measured))
+
+    def hold(self) -> tuple[bool, str]:
+        """Bring the earthquake's time to a standstill; return whether that is possible now, and a sentence."""
+        return self._holding.hold(self.ticks, self._motion)
+
+    def resume(self) -> tuple[bool, str]:
+        """Let the earthquake's time of a held test go on; return whether it is held, and a sentence."""
+        return self._holding.resume(self.ticks, self._motion)
+
     # -- end --------------------------------------------------------------------------------------
 
     def stop(self, reason: str) -> None:
@@ -330,7 +350,7 @@ class MasterLoop(RigLoop):
         ended = (
             self.lab.plan.served and self.lab.exchange.cause == COMPLETED
         )  # the client has ended its analysis
-        return ended or self.ticks >= self.lab.plan.ticks
+        return ended or self.ticks >= self.lab.until
 
     @property
     def needed(self) -> bool:
@@ -357,7 +377,8 @@ class MasterLoop(RigLoop):
     @property
     def progress(self) -> dict[str, float]:
         """The figures of the progress report: a storey's drift (m) and those of all laboratories."""
-        return {"drift": self._drift} | self._together.progress(self._own.force(self._measured))
+        figures = self._together.progress(self._own.force(self._measured))
+        return {"drift": self._drift} | figures | self._holding.progress
 
     # -- pacing -----------------------------------------------------------------------------------
 

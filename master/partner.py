@@ -12,6 +12,7 @@ from common.protocol.tally import Tally
 from common.roles import latency_topic, name_of, title
 from common.safety.watchdog import Watchdog, WatchdogFinding
 from common.signals import Channels
+from laboratories.kind import Moving
 from master.building import Sent
 from master.latency import LatencyAccount
 
@@ -65,7 +66,8 @@ class Partner:
         self.channels = channels
         self._force = channels.names.index(channels.force)
         self.position = channels.names.index(channels.position)
-        self.used = NO_FEEDBACK._replace(measured=(0.0,) * len(channels.names))
+        self.force_name = channels.force
+        self.used = self._before = NO_FEEDBACK._replace(measured=(0.0,) * len(channels.names))
         self.sent: Sent = NOTHING_SENT
 
     # -- handshake --------------------------------------------------------------------------------
@@ -170,7 +172,7 @@ class Partner:
     def begin(self, tick: int, now: int) -> float:
         """Begin a tick; returns the force (N) that it uses, that of the newest feedback available."""
         if (feedback := self._feedback.take(tick)) is not None:
-            self.used = feedback
+            self._before, self.used = self.used, feedback
             self.tally.use(feedback.seq)
         self.account.close(tick - 1, now)
         return self.used.measured[self._force]
@@ -179,6 +181,14 @@ class Partner:
     def force(self) -> float:
         """The force (N) in use."""
         return self.used.measured[self._force]
+
+    def moving(self, duration: float, interval: float) -> Moving:
+        """The motion of its laboratory by the newest feedback and the one before; `duration` (s) of a standstill."""
+        used, before = self.used, self._before
+        _, effort, velocity, *_ = self.sent
+        between = max(used.seq - before.seq, 1) * interval
+        rates = tuple((new - old) / between for new, old in zip(used.measured, before.measured, strict=True))
+        return Moving(velocity, effort, used.measured, rates, duration)
 
     def look(self, tick: int) -> WatchdogFinding:
         """The watchdog's finding at a tick that came in time."""

@@ -33,7 +33,7 @@ class Items:
         topics = kinds.topics(plan)
         own = {"event", lab, ramp_topic(lab), *(map(latency_topic, plan.roles) if lab == MASTER else ())}
         own &= topics.keys()  # a master without a laboratory has no ramp
-        self._ticks = plan.ticks
+        self.ticks = plan.ticks  # of the test; more where it is held
         self._table = RowTable({topic: topics[topic] for topic in own}, plan.storeys)
         self._others = {topic: checks(topics[topic], plan) for topic in own if topic not in self._table.sizes}
         for topic, size in list(self._table.sizes.items())[:1]:  # loads the kernel before a test begins
@@ -56,7 +56,7 @@ class Items:
             if len(others) == len(items):
                 return items
             topics, rows = zip(*(item for item in items if item[0] in sizes), strict=True)
-        return items if self._table.sound(topics, rows, self._ticks) else None
+        return items if self._table.sound(topics, rows, self.ticks) else None
 
     def _admits(self, topic: str, row: bytes) -> bool:
         """Whether a row that is not plain has valid stamps and values; its tick is not checked.

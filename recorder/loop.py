@@ -18,7 +18,7 @@ from common.link.endpoint import Endpoint
 from common.plan import patience
 from common.plan.plan import PROTOCOL_VERSION, Plan
 from common.plan.plan_difference import differences, digest_of, said
-from common.protocol.messages import Finished, Message, Recorder, Register, Resend, Samples
+from common.protocol.messages import Extend, Finished, Message, Recorder, Register, Resend, Samples
 from common.recording.rows import HEAD, Item, layout, named_values, other
 from common.reporting import Report
 from common.roles import MASTER, RECORDER, kind_of, latency_topic, title
@@ -64,8 +64,9 @@ class RecorderLoop:
         self._sink = sink
         self._digest, self._said = setting.plan.digest(), said(setting.plan)
         labs = (MASTER, *setting.plan.roles)
-        most = ITEMS_PER_TICK * len(labs) * (setting.plan.ticks + SPARE_TICKS)
-        self._inlets = {lab: Inlet(Items(setting.plan, lab).unpack, most) for lab in labs}
+        self._ticks = setting.plan.ticks  # of the test; more where it is held
+        self._items = {lab: Items(setting.plan, lab) for lab in labs}
+        self._inlets = {lab: Inlet(items.unpack, self._most_items) for lab, items in self._items.items()}
         self._holes: dict[str, StreamHole] = {}
         self._session = 0
         self._said_ns = -REPEAT_NS
@@ -91,6 +92,11 @@ class RecorderLoop:
         self.error: IncompleteError | InputError | InterlockError | LostError | None = None
         self.done = False
 
+    @property
+    def _most_items(self) -> int:
+        """Largest number of items of a laboratory's stream."""
+        return ITEMS_PER_TICK * len(self._items) * (self._ticks + SPARE_TICKS)
+
     # -- messages ---------------------------------------------------------------------------------
 
     def take(self, message: Message, received_ns: int) -> None:
@@ -105,8 +111,20 @@ class RecorderLoop:
                 self._write(self._inlets[message.lab].take(message))
             case Finished() if message.lab in self._inlets:
                 self._inlets[message.lab].end(message)
+            case Extend():
+                self._extend(message.ticks)
             case _:
                 pass
+
+    def _extend(self, ticks: int) -> None:
+        """Take note that holds have made the test longer, by no more ticks than have been recorded and a ramp has."""
+        if not self._ticks <= ticks <= 2 * self._plan.ticks + self._newest_tick + SPARE_TICKS:
+            return
+        more, self._ticks = ticks - self._ticks, ticks
+        for lab, inlet in self._inlets.items():
+            inlet.most, self._items[lab].ticks = self._most_items, ticks
+        for seen in self._seen.values():
+            seen.extend(bytes(more))
 
     def _register(self, request: Register) -> None:
         if self._session:
@@ -361,7 +379,7 @@ class RecorderLoop:
 
     def summary(self) -> dict[str, str]:
         """The summary: expected, recorded and missing items, and how the test ended."""
-        result: dict[str, Any] = {"ticks_expected": self._plan.ticks}
+        result: dict[str, Any] = {"ticks_expected": self._ticks}
         for topic, seen in self._seen.items():
             result[f"{topic}_recorded"] = seen.count(1)
             result[f"{topic}_gaps"] = seen.count(0, 0, seen.rfind(1) + 1)

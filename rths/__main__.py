@@ -23,6 +23,8 @@ VERBS = {
     "panel": "operate a test from a browser: check, arm, start, stop, reset",
     "start": "begin a test whose armed laboratories wait for it",
     "stop": "stop a running test, in order or at once",
+    "hold": "let the earthquake's time of a running test stand still, the specimens held",
+    "resume": "let a held test go on",
     "reset": "let laboratories leave their latched safe state",
     "init": "write a plan to begin with, and the skeleton of a rig",
     "check": "describe a plan: periods, delays, peaks, likely slips of units, classes of your own that it would run",
@@ -55,7 +57,7 @@ VERBS = {
 }
 
 FOLDERS = {
-    "rths.perform": ("run", "serve", "live", "panel", "start", "stop", "reset"),
+    "rths.perform": ("run", "serve", "live", "panel", "start", "stop", "hold", "resume", "reset"),
     "rths.prepare": (
         "init",
         "check",
@@ -131,6 +133,8 @@ EXAMPLES = {
     "panel": "rths panel default --duration 20",
     "start": "rths start --reason ready",
     "stop": "rths stop --emergency",
+    "hold": 'rths hold --reason "a look at the cracks"',
+    "resume": "rths resume",
     "reset": "rths reset --reason inspected",
     "init": "rths init my_test",
     "check": "rths check test.toml",

@@ -20,6 +20,7 @@ from common.protocol.exchange import Event, State
 from common.protocol.messages import (
     Arm,
     Command,
+    Extend,
     Feedback,
     Message,
     Operator,
@@ -109,6 +110,8 @@ class SlaveLoop(RigLoop):
         match message:
             case Stop():
                 self._stop(message)
+            case Extend() if lab.extend(message.ticks, received_ns):
+                self._tally.extend(lab.until)
             case Trip():
                 lab.tripped(message.lab, message, self.ticks)
             case _:
@@ -304,7 +307,7 @@ class SlaveLoop(RigLoop):
     @property
     def completed(self) -> bool:
         """Whether the test had all its ticks, here or at the master if this laboratory has fallen behind."""
-        whole = max(self.ticks, self._master_ticks) >= self.lab.plan.ticks
+        whole = max(self.ticks, self._master_ticks) >= self.lab.until
         return whole or (self.lab.plan.served and self.lab.exchange.cause == COMPLETED)
 
     @property

@@ -142,8 +142,8 @@ def handshake(loop: DrivenLoop, stopping: Callable[[], str]) -> None:
 def run(loop: DrivenLoop, stopping: Callable[[], str]) -> int:
     """Run the ticks until the last one or the test's early end; return the number of the tick that would come next."""
     lab = loop.lab
-    reported = 0
-    for tick in range(lab.plan.ticks):
+    reported = tick = 0
+    while tick < lab.until:  # which grows while the test is held
         wait(loop, tick)
         if reason := stopping():
             loop.stop(reason)
@@ -156,8 +156,9 @@ def run(loop: DrivenLoop, stopping: Callable[[], str]) -> int:
             reported = lab.clock.now()
             lab.tell_news(tick)
             lab.report("progress", {"tick": tick, "t": tick * lab.plan.test.interval, **loop.progress})
-    wait(loop, lab.plan.ticks)
-    return lab.plan.ticks
+        tick += 1
+    wait(loop, tick)
+    return tick
 
 
 def ramp(loop: DrivenLoop, tick: int) -> None:
@@ -201,7 +202,7 @@ def wait(loop: DrivenLoop, tick: int) -> None:
     earliest, nominal = loop.begins(tick)
     clock.sleep_until(earliest)
     late = clock.now() - nominal
-    if late > 0 and lab.running and tick < lab.plan.ticks and lab.overrun(late, tick):
+    if late > 0 and lab.running and tick < lab.until and lab.overrun(late, tick):
         return
     take_all(loop)
     while not loop.heard(tick) and lab.running and (left := loop.latest(tick) - clock.now()) > 0:

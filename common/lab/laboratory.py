@@ -57,6 +57,7 @@ class Laboratory:
         self.exchange = Exchange()
         self.safety = Safety(self._turned)
         self.tick = 0  # the newest one that has begun
+        self.until = setting.plan.ticks  # ticks of the test, more than the plan's where it is held
         self.answers: dict[int, tuple[bool, str]] = {}  # by the operator's press: accepted, and a sentence
         self._exact_ns = setting.plan.test.interval * 1e9
         self.interval_ns = round(self._exact_ns)
@@ -99,6 +100,17 @@ class Laboratory:
     def tick_at(self, elapsed_ns: int) -> int:
         """The tick whose interval contains a time (ns) after the first tick; half a ns allows for rounded stamps."""
         return math.floor((elapsed_ns + 0.5) / self._exact_ns)
+
+    def extend(self, ticks: int, at_ns: int) -> bool:
+        """Take note, at a time (ns), that holds have made the test longer; return whether that is possible.
+
+        Holds add no more ticks than have passed, apart from their ramps, which are shorter than the test.
+        """
+        passed = self.tick_at(at_ns - self.start_ns) + self.plan.window
+        if not self.until <= ticks <= 2 * self.plan.ticks + passed:
+            return False
+        self.until = ticks
+        return True
 
     def note(
         self,

@@ -1,4 +1,4 @@
-"""What a laboratory does at an operator's request: start, stop in order, stop at once, reset.
+"""What a laboratory does at an operator's request: start, stop in order, stop at once, reset, hold, resume.
 
 `ORDERS` holds every request that there is, with the roles that answer it. `rths.perform.operate` sends one, numbers it
 and collects the answers; its docstring says how.
@@ -15,6 +15,7 @@ from common.protocol.messages import Answer, Operator
 from common.roles import MASTER
 
 START, STOP, EMERGENCY, RESET = "start", "stop", "emergency", "reset"
+HOLD, RESUME = "hold", "resume"
 
 
 class Order(NamedTuple):
@@ -36,6 +37,8 @@ ORDERS: Mapping[str, Order] = {
         Order(STOP, "bring all rigs to rest in order and end the test"),
         Order(EMERGENCY, "stop all rigs at once, without a ramp; latched until reset"),
         Order(RESET, "let laboratories leave their latched safe state once its cause is gone"),
+        Order(HOLD, "let the earthquake's time slow down and stand still", everywhere=False),
+        Order(RESUME, "let the earthquake's time of a held test go on", everywhere=False),
     )
 }
 
@@ -54,6 +57,12 @@ class Operated(Protocol):
     def emergency(self, error: EmergencyStopError) -> None:
         """Stop the rig at once."""
 
+    def hold(self) -> tuple[bool, str]:
+        """Hold the test; return whether that is possible now, and a sentence."""
+
+    def resume(self) -> tuple[bool, str]:
+        """Resume a held test; return whether it was held, and a sentence."""
+
     def standing(self) -> str:
         """Why the cause of a latched state persists, empty where it is gone."""
 
@@ -65,7 +74,8 @@ def obey(loop: Operated, wish: Operator) -> None:
         return
     if lab.safety.pressed(wish.press):
         lab.answers[wish.press] = _done(loop, wish)
-        lab.note("operator", f"{wish.word}: {lab.answers[wish.press][1]}", tick=lab.tick)
+        why = f" ({wish.reason})" if wish.reason else ""
+        lab.note("operator", f"{wish.word}{why}: {lab.answers[wish.press][1]}", tick=lab.tick)
     accepted, text = lab.answers[wish.press]
     lab.endpoint.send(Answer(0, wish.press, int(accepted), text))
 
@@ -82,6 +92,8 @@ def _done(loop: Operated, wish: Operator) -> tuple[bool, str]:
         return True, f"{lab.safety.mode.value}."
     if lab.exchange.ended:
         return False, "The test is over already."
+    if wish.word in (HOLD, RESUME):
+        return loop.hold() if wish.word == HOLD else loop.resume()
     loop.end(f"stopped by the operator: {reason}.")
     return True, f"{lab.safety.mode.value}."
 

@@ -145,7 +145,7 @@ class Inlet:
         self.lost = 0
         self.rejected = 0
         self._unpack = unpack
-        self._most = most
+        self.most = most
         self._early: dict[
             int, tuple[tuple[Item, ...], int]
         ] = {}  # by first item: items, and bytes of the piece
@@ -155,7 +155,7 @@ class Inlet:
         """The items that are complete and in order with this piece; a repeated piece gives none."""
         if piece.first < self.next or piece.first in self._early:
             return []
-        items = self._unpack(piece.items) if piece.first < self._most else None
+        items = self._unpack(piece.items) if piece.first < self.most else None
         if items is None:
             self.rejected += 1
             return []
@@ -169,7 +169,7 @@ class Inlet:
 
     def end(self, finished: Finished) -> None:
         """Take note of the length of the stream."""
-        if finished.total <= self._most:
+        if finished.total <= self.most:
             self.total = finished.total
         else:
             self.rejected += 1

@@ -126,6 +126,14 @@ class RigLoop:
             lab.safety.follow(Turn.END)
             self.tell()
 
+    def hold(self) -> tuple[bool, str]:
+        """Hold the test; the master alone can do so."""
+        return False, "Only the master holds a test."
+
+    def resume(self) -> tuple[bool, str]:
+        """Resume a held test; the master alone can do so."""
+        return False, "Only the master resumes a test."
+
     def standing(self) -> str:
         """Why the cause of a latched state persists, an empty text where it is gone."""
         try:

@@ -21,6 +21,7 @@ from common.protocol.messages import (
     Arm,
     Armed,
     Command,
+    Extend,
     Feedback,
     Finished,
     Message,
@@ -49,7 +50,7 @@ CHANNELS: dict[type, str] = {Command: TICK, Feedback: TICK, Samples: SAMPLES, Fi
 LARGEST = {TICK: 256, CONTROL: 1 << 16, SAMPLES: codec.MOST_FRAME}
 
 SPOKEN: Mapping[str, frozenset[type]] = {
-    MASTER: frozenset({Register, Arm, Sync, Start, Command, Stop, Trip, Answer, Samples, Finished}),
+    MASTER: frozenset({Register, Arm, Sync, Start, Command, Stop, Extend, Trip, Answer, Samples, Finished}),
     SLAVE: frozenset(
         {
             Waiting,

@@ -43,7 +43,7 @@ from common.plan.tables import (
 )
 from common.roles import MASTER, name_of, slave_role
 
-PROTOCOL_VERSION = 6
+PROTOCOL_VERSION = 7
 OVERRUN = "safety.overrun"
 FOLLOWS_IN = "table.compensator"
 

@@ -128,6 +128,13 @@ class Stop(NamedTuple):
     reason: str
 
 
+class Extend(NamedTuple):
+    """Master to slaves and recorder: the test has at least so many ticks, because it was held."""
+
+    session: int
+    ticks: int
+
+
 class Stopped(NamedTuple):
     """Slave to master: the rig is disarmed; after a trip this is the slave's last message."""
 
@@ -145,11 +152,11 @@ class Trip(NamedTuple):
 
 
 class Operator(NamedTuple):
-    """Operator to the laboratories: stop, stop at once, or reset; repetitions of one press have the same `press`."""
+    """Operator to the laboratories: an order of `common.lab.operation`; repetitions of one press have one `press`."""
 
     session: int
     plan: str  # digest
-    word: str  # stop, emergency, reset
+    word: str  # of the order
     press: int
     reason: str
 
@@ -213,6 +220,7 @@ Message = (
     | Command
     | Feedback
     | Stop
+    | Extend
     | Stopped
     | Trip
     | Operator

@@ -23,6 +23,10 @@ class Tally:
         self._newest = -1
         self.reasons: Counter[str] = Counter()
 
+    def extend(self, ticks: int) -> None:
+        """Take note that the test has at least so many ticks; it never gets shorter."""
+        self._fates.extend(bytes(max(ticks - len(self._fates), 0)))
+
     def admit(self, seq: int, expected: int) -> bool:
         """Whether the message `seq` is fresh; `expected` is the tick in which it came. It is counted either way."""
         window, fates = self._window, self._fates

@@ -63,12 +63,20 @@ def plain(kind: str, data: Mapping[str, Any]) -> str:
 
 def facts(data: Mapping[str, Any], duration: float) -> str:
     """A report of progress as one line."""
-    text = f"t {data['t']:6.2f}/{duration:g} s"
+    text = reached(float(data["t"]), duration, data)
     if "drift" in data:
         text += f"  drift {data['drift'] * 1e3:+7.3f} mm"
     if "round_trip" in data:
         text += f"  round trip {microseconds(data['round_trip'])} µs  late {data['missed']:.0f}"
     return text
+
+
+def reached(t: float, duration: float, data: Mapping[str, Any]) -> str:
+    """How far a test is at a time t (s); after a hold also in the earthquake's time, which ends at `duration`."""
+    if "earthquake_time" not in data:
+        return f"t {t:6.2f}/{duration:g} s"
+    still = ", held" if data["rate"] == 0.0 else ""
+    return f"t {t:6.2f} s, earthquake {data['earthquake_time']:.2f}/{duration:g} s{still}"
 
 
 def microseconds(seconds: float) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from common.errors import InputError
 from common.plan.plan import Plan, ideal
 from common.plan.read import parse
+from common.recording.holds import before, holds
 from common.recording.imported import ImportedData, imported
 from common.recording.run import GROUND, Run
 from common.roles import MASTER, SLAVE, title
@@ -60,6 +61,7 @@ class Record:
     whole: WholeTest | None = None  # the test around it, where that has several slaves
     plans: dict[str, Plan] = field(default_factory=dict)  # by role, as each sees it
     labs: tuple[RecordedLaboratory, ...] = ()  # the laboratories that it shows, the master's first
+    held: float | None = None  # test time (s) of the first hold, before which it ends; None without a hold
 
     @cached_property
     def stated(self) -> ImportedData | None:
@@ -133,7 +135,8 @@ class Record:
 def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, role: str = SLAVE) -> Record:
     """The record of a recording under a plan, its own where none is given.
 
-    It shows the master and the slave whose `role` is given, or the master alone where that is the master's role. With
+    It shows the master and the slave whose `role` is given, or the master alone where that is the master's role. It
+    ends where the test was held first, because from there on forces were not measured at the rate of the test. With
     `against_ideal` the recording is compared with the pure simulation of the plan, whose transfer systems reach every
     target exactly: their command is then the target, and their compensation counts as a part of them.
 
@@ -145,6 +148,9 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
     if chosen is None:
         raise InputError(f"{run.path} carries no plan: give the one that it was recorded under with --plan.")
     check_slaves(run, chosen)
+    first = next(iter(holds(run.events, chosen.test.interval)), None)
+    if first is not None:
+        run = before(run, first.begun)
     every, whole = chosen, run
     if role != MASTER:
         run, chosen = run.of(role), chosen.of(role)
@@ -169,7 +175,8 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
     around = None
     if every.slaves and whole.has(MASTER):
         around = WholeTest(every, role, used_forces(whole, every, ticks))
-    return Record(chosen, run, ticks, signals, present, ground, other, around, plans, labs)
+    held = first.begun * chosen.test.interval if first is not None else None
+    return Record(chosen, run, ticks, signals, present, ground, other, around, plans, labs, held)
 
 
 def used_forces(run: Run, plan: Plan, ticks: int) -> Array:

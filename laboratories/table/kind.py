@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 from common.plan.laboratory_tables import ForceCorrection
 from common.plan.plan import Plan
 from common.signals import TABLE_CHANNELS
-from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Machine, Pictured, Sensed
+from laboratories.kind import (
+    Chosen,
+    Coasting,
+    Coupling,
+    Follows,
+    Hysteresis,
+    Kind,
+    Limited,
+    Machine,
+    Moving,
+    Pictured,
+    Sensed,
+)
 from laboratories.table import model
 from laboratories.table.descent import TableRamp
 from laboratories.table.model import TableLab
@@ -106,6 +119,23 @@ class TableKind(Kind):
         """The compensator of `[table.compensator]`."""
         chosen = plan.table.compensator
         return Chosen(chosen.kind, chosen.parameters, plan.follows_in)
+
+    def coasting(self, plan: Plan, moving: Moving) -> Coasting:
+        """The swing of the damper's mass on its spring after the table has stopped, without damping.
+
+        In the worst case the speeds of the mass on the table, of the table, and the impulse of the motor's force while
+        it goes to zero with the rate of the earthquake's time, add up.
+        """
+        damper, stroke = plan.damper, self.channels.names.index(self.free)
+        speed = abs(moving.rates[stroke]) + abs(moving.velocity)
+        speed += 0.5 * abs(moving.effort) * moving.duration / damper.mass
+        energy = 0.5 * (damper.stiffness * moving.measured[stroke] ** 2 + damper.mass * speed**2)
+        if damper.stiffness:
+            peak = math.sqrt(2.0 * energy / damper.stiffness)
+        else:  # its dashpot alone ends the motion
+            way = speed * damper.mass / damper.damping if damper.damping else math.inf
+            peak = abs(moving.measured[stroke]) + way
+        return Coasting(self.free, peak, self.coupling(plan).scale * energy)
 
     def ramp(self, plan: Plan, last: tuple[float, ...], before: tuple[float, ...]) -> TableRamp:
         """The ramp on which the table comes to a hold and the motor's force goes to zero."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from common import signals
 from common.plan.plan import Plan
+from common.recording.holds import added, holds
 from common.recording.outcome import COMPLETED, outcome
 from common.recording.run import Run
 from common.roles import LATENCY, MASTER, kind_of
@@ -28,11 +29,17 @@ def due(run: Run, plan: Plan | None) -> dict[str, int]:
     if (
         outcome(run.metadata.get("summary", {})) in WHOLE and not plan.served
     ):  # a client ends it when it likes
-        return dict.fromkeys(topics, plan.ticks)
+        return dict.fromkeys(topics, plan.ticks + held(run, plan, plan.ticks))
     said = endings(run, plan.test.interval)
     left = {topic: max(begun[topic], said[lab]) for topic in topics if (lab := laboratory(topic)) in said}
     last = max([*begun.values(), *left.values()], default=0)
-    return {topic: min(left.get(topic, last), plan.ticks) for topic in topics}
+    most = plan.ticks + held(run, plan, last)
+    return {topic: min(left.get(topic, last), most) for topic in topics}
+
+
+def held(run: Run, plan: Plan, last: int) -> int:
+    """Ticks by which holds have made the test longer that ended at the tick `last`."""
+    return added(holds(run.events, plan.test.interval), last)
 
 
 def laboratory(topic: str) -> str:

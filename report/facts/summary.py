@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from common.errors import InputError
+from common.plan.plan import Plan
+from common.recording.holds import added, holds
 from common.recording.run import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, name_of
 from laboratories.column.kind import COLUMN
@@ -53,7 +55,8 @@ def summarize(run: Run) -> dict[str, Any]:
         "clock": circumstances.clock_of(run),
         "circumstances": circumstances.sentence(run, plan),
         "ground_motion": run.metadata.get("ground_motion", {}),
-        "ticks_planned": plan.ticks if plan else None,
+        "holds": (held := told_holds(run, plan)),
+        "ticks_planned": plan.ticks + sum(one["added"] for one in held) if plan else None,
         "ticks_expected": max(expected.values(), default=0) if plan else None,
         "topics": {topic: completeness(run, topic, ticks) for topic, ticks in expected.items()},
         "recorder": dict(run.metadata.get("summary", {})),
@@ -76,6 +79,30 @@ def summarize(run: Run) -> dict[str, Any]:
         "exchange": accounts(run),
         "events": run.events,
     }
+
+
+def told_holds(run: Run, plan: Plan | None) -> list[dict[str, Any]]:
+    """Every hold of the test: when it began (s), where the earthquake's time stood (s), how long it took (s).
+
+    `added` are the ticks by which it made the test longer; what is not known where the test ended in it is None.
+    """
+    if plan is None:
+        return []
+    interval, result, behind = plan.test.interval, [], 0
+    last = max(map(run.ticks, run.columns), default=0)
+    for hold in holds(run.events, interval):
+        more = added([hold], last)
+        over = hold.over
+        result.append(
+            {
+                "t": hold.begun * interval,
+                "earthquake_time": (hold.begun - behind + 0.5 * hold.ramp) * interval,
+                "duration": None if over is None else (over - hold.begun) * interval,
+                "added": more,
+            }
+        )
+        behind += more
+    return result
 
 
 def completeness(run: Run, topic: str, expected: int) -> dict[str, Any]:

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from common.host.clock import Clock
-from common.roles import RECORDER
+from common.recording.holds import HELD, HOLD, RESUME, RESUMED
+from common.roles import MASTER, RECORDER
 from common.safety.modes import LATCHED, Mode
 from recorder.loop import CONSEQUENCE
 
@@ -22,6 +23,10 @@ GRAVEST = (  # the first of these modes that any laboratory is in is the state o
     Mode.CONFIGURED,
     Mode.IDLE,
 )
+
+
+# the test in words after the master's events of a hold, while its laboratories run
+PACES = {HOLD: "slowing down to a hold", HELD: "held", RESUME: "resuming", RESUMED: ""}
 
 
 class StopCause(NamedTuple):
@@ -45,6 +50,7 @@ class Standing:
         self.modes: dict[str, str] = {}
         # Causes that arose in a laboratory itself; where there are none, those that followed another laboratory.
         self.stops: list[StopCause] = []
+        self.pace = ""  # one of `PACES`, empty in real time
         self._clock = clock
         self._t: dict[str, float] = {}  # newest time of each laboratory
         self._shift = math.inf  # s
@@ -61,6 +67,8 @@ class Standing:
         self._t[lab] = max(t, self._t.get(lab, 0.0))
         if event["code"] == "mode" and 0 <= values.get("mode", -1) < len(MODES):
             self.modes[lab] = MODES[int(values["mode"])]
+        if lab == MASTER:
+            self.pace = PACES.get(event["code"], self.pace)
         if event["level"] == "error" and lab != RECORDER:
             self.stops.append(StopCause(lab, t, str(event["code"]), str(event["text"])))
             own = [stop for stop in self.stops if stop.code != CONSEQUENCE]
@@ -81,6 +89,10 @@ class Standing:
 
     @property
     def gravest(self) -> str:
-        """The mode of the laboratory that is farthest from running, empty while none is known."""
+        """The mode of the laboratory that is farthest from running, empty while none is known.
+
+        Where all run it is how the test is held, if it is.
+        """
         found = [mode.value for mode in GRAVEST if mode.value in self.modes.values()]
-        return found[0] if found else ""
+        first = found[0] if found else ""
+        return self.pace if self.pace and first == Mode.RUNNING.value else first

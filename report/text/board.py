@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from common.safety.modes import Mode
+from common.terminal.plain_report import reached
 from common.terminal.printable import shown
 
 BLOCKS = "▁▂▃▄▅▆▇█"
@@ -51,7 +52,7 @@ KNOWN = {
         BoardRow("round_trip", "round trip", 1e6, "µs", "9.0f"),
     )
 }
-BESIDE = ("tick", "t", "missed")  # of a report: no row of its own
+BESIDE = ("tick", "t", "missed", "earthquake_time", "rate")  # of a report: no row of its own
 LABEL = len("column force")  # columns at least
 
 
@@ -67,11 +68,14 @@ class Board:
         self.modes: dict[str, str] = {}
         self._duration = duration
         self._t = self._late = 0.0
+        self._said = reached(0.0, duration, {})
         self._values: dict[str, deque[float]] = {}  # in the order of the reports
 
     def take(self, data: Mapping[str, Any]) -> None:
         """Take in a report of progress."""
         self._t, self._late = float(data["t"]), float(data.get("missed", self._late))
+        self._said = reached(self._t, self._duration, data)
+        self._t = float(data.get("earthquake_time", self._t))
         for name, value in data.items():
             if name not in BESIDE and isinstance(value, float | int):
                 self._values.setdefault(name, deque(maxlen=KEPT)).append(float(value))
@@ -86,7 +90,7 @@ class Board:
     def _head(self) -> list[Span]:
         filled = round(BAR * min(self._t / self._duration, 1.0))
         return [
-            Span(f"t {self._t:6.2f}/{self._duration:g} s  "),
+            Span(f"{self._said}  "),
             Span(f"late {self._late:.0f}  ", YELLOW if self._late else ""),
             Span("█" * filled, BLUE),
             Span("·" * (BAR - filled)),

@@ -109,6 +109,13 @@ def write_completeness(summary: dict[str, Any]) -> None:
     """Ticks expected, recorded and missing."""
     if text := stopped(summary):
         sys.stdout.write(f"{text}\n")
+    for hold in summary["holds"]:
+        lasted = (
+            "until the end" if hold["duration"] is None else f"for {hold['duration']:.3f} s with its ramps"
+        )
+        sys.stdout.write(
+            f"held at t {hold['t']:.3f} s, with the earthquake's time at {hold['earthquake_time']:.3f} s, {lasted}\n"
+        )
     rows = [["topic", "expected", "recorded", "missing", "holes"]]
     for topic, facts in summary["topics"].items():
         holes = " ".join(f"{first}–{last}" for first, last in facts["holes"]) or "none"

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from common.plan.plan import Plan
     from common.recording.run import Run
     from master.building import Outputs
+    from master.step import MasterStep
 
 NOWHERE = (0.0, 0.0)  # position and force where the master has no laboratory
 
@@ -100,6 +101,7 @@ def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, 
     """The building and the commands to all laboratories, from the first tick to the first that is missing."""
     import numpy as np
 
+    from common.recording.holds import holds
     from laboratories import kinds
     from master.step import MasterStep
 
@@ -112,9 +114,12 @@ def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, 
     held = held_ticks(recording, columns[own.command.name] if own else [])
     matches: dict[str, Match] = {}
     command: dict[str, Any] = {name: np.zeros(recorded[name].shape[1:]) for name in names.held}
+    ordered = {hold.begun: hold.resumed for hold in holds(recording.events, plan.test.interval)}
     for tick, seq in enumerate(columns["seq"]):
         if seq != tick:
             break
+        if tick in ordered:
+            hold(step, tick, ordered[tick])
         tell("the master's ticks", tick, len(columns["seq"]))
         here = [values[tick] for values in felt] or NOWHERE
         outputs = names.of(step(tick, here[0], here[1], [values[tick] for values in used]))
@@ -124,6 +129,17 @@ def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, 
         for name, value in outputs.items():
             matches.setdefault(name, Match()).take(columns["t"][tick], value, columns[name][tick])
     return {f"{MASTER}/{name}": match for name, match in matches.items()}
+
+
+def hold(step: MasterStep, tick: int, resumed: int | None) -> None:
+    """Hold the building from a tick on, and resume it at the tick at which the test was resumed."""
+    if step.time is None:
+        raise InputError(
+            "The recording has a hold, which its plan does not allow: nothing limits the speed of a target."
+        )
+    step.hold(tick)
+    if resumed is not None:
+        step.time.resume(resumed)
 
 
 class ComputedSignals:
