@@ -32,9 +32,9 @@ damper_stroke = 10.0
 PATIENT = (
     """
 [safety]
-hold_after = 3000
-ramp_after = 5000
-overrun = 5000
+hold_after = 60000
+ramp_after = 70000
+overrun = 60000
 [preflight]
 lost = 1000
 late_share = 1.0
@@ -132,7 +132,9 @@ def largest(values: object) -> float:
 def patient(folder: Path) -> Path:
     """A file with the default test and limits that a paused machine does not exceed."""
     path = folder / "patient.toml"
-    path.write_text(PATIENT)
+    path.write_text(
+        PATIENT + "[link]\nconnect_timeout = 150.0\nloss_timeout = 60.0\n[recording]\npatience = 100.0\n"
+    )
     return path
 
 

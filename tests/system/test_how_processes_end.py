@@ -82,6 +82,7 @@ def test_a_run_command_that_is_killed_at_once_leaves_no_process(seconds: float, 
     assert all(map(gone, numbers))
 
 
+@pytest.mark.slow  # a machine that stops for longer than the silence ends the test first
 @LINUX
 def test_a_killed_slave_is_detected_and_named_by_the_master(tmp_path: Path) -> None:
     path, planned = tmp_path / "a.mcap", tmp_path / "plan.toml"

@@ -269,7 +269,7 @@ PLAN = (
 name = "secure"
 duration = 2.0
 [link]
-loss_timeout = 5.0
+loss_timeout = 60.0
 [link.security]
 folder = "keys"
 """
