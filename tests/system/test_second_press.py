@@ -55,7 +55,10 @@ ramp_after = 100_000
 overrun = 100_000
 velocity = 0.0007
 [link]
+connect_timeout = 150.0
 loss_timeout = 60.0
+[recording]
+patience = 100.0
 [preflight]
 exchanges = 50
 lost = 50

@@ -269,7 +269,10 @@ PLAN = (
 name = "secure"
 duration = 2.0
 [link]
+connect_timeout = 150.0
 loss_timeout = 60.0
+[recording]
+patience = 100.0
 [link.security]
 folder = "keys"
 """
