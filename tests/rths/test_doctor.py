@@ -222,7 +222,8 @@ def children_of(pid: int) -> list[int]:
 @pytest.mark.skipif(sys.platform != "linux", reason="children are found in /proc")
 @pytest.mark.parametrize(("number", "expected"), [(signal.SIGINT, 3), (signal.SIGKILL, -signal.SIGKILL)])
 def test_an_interrupted_check_leaves_no_child_process(number: int, expected: int) -> None:
-    words = [*RTHS, "--rt", "off", "--seconds", "300"]  # which no machine that stops for half a minute reaches
+    # a machine that stops for half a minute does not reach the end of the check
+    words = [*RTHS, "--rt", "off", "--seconds", "300"]
     doctor = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
     assert doctor.stderr is not None
     assert doctor.stderr.readline().startswith("doctor: round trip")
