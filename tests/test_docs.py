@@ -50,7 +50,7 @@ def test_a_generated_document_equals_what_the_code_generates(name: str) -> None:
     assert generate.renewed(text, generate.parts()[name]) == text, "run `make docs`"
 
 
-def test_a_part_without_a_place_is_refused() -> None:
+def test_a_generated_part_without_a_place_in_its_document_is_refused() -> None:
     with pytest.raises(ValueError, match="no place for 'modes'"):
         generate.renewed("<!-- modes -->\n", {"modes": ""})
 

@@ -1,4 +1,4 @@
-"""How the peer of `rths serve` counts the ticks without a displacement: as `rths serve` does."""
+"""The peer of `rths serve` counts the ticks without a displacement as `rths serve` does."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ INTERVAL, SHARE = 2000, 1500
         (24_100, 24_400, 0),  # after a pause of seven ticks
     ],
 )
-def test_ticks_that_end_before_the_displacement_are_the_clients_where_it_had_time(
+def test_ticks_without_a_displacement_are_attributed_to_the_client_if_it_had_time(
     handed: int, came: int, late: int
 ) -> None:
     assert missed(5, handed, came, INTERVAL, SHARE) == late

@@ -8,7 +8,7 @@ from benchmarks import scale
 from common.plan.plan import Plan
 
 
-def test_one_storey_is_the_default_building() -> None:
+def test_a_uniform_building_of_one_storey_equals_the_default_building() -> None:
     structure, default = scale.uniform(1).structure, Plan().structure
     assert structure.mass == default.mass
     assert structure.stiffness == pytest.approx(default.stiffness)

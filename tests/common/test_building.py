@@ -154,7 +154,9 @@ def test_the_benchmarks_specimen_may_take_at_most_3_18_meganewtons_per_metre(pla
     st.lists(st.floats(-1.0, 1.0), min_size=16, max_size=16),
     st.lists(st.floats(-0.5, 2.0), min_size=4, max_size=4),
 )
-def test_positive_definite_is_what_the_eigenvalues_say(entries: list[float], values: list[float]) -> None:
+def test_the_check_for_positive_definiteness_agrees_with_the_eigenvalues(
+    entries: list[float], values: list[float]
+) -> None:
     q, _ = np.linalg.qr(np.array(entries).reshape(4, 4) + 3.0 * np.eye(4))
     matrix = q @ np.diag(values) @ q.T
     least = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min())
@@ -222,7 +224,7 @@ def test_a_realitys_dashpots_replace_a_damping_ratio_and_the_reverse(plan: Plan,
             damping(planned, f"damping_ratio = 0.03\ndamping = {values}")
 
 
-def test_an_ideal_plan_of_servo_hydraulics_survives_its_own_text(plan: Plan) -> None:
+def test_an_ideal_plan_of_servo_hydraulics_is_the_same_after_being_written_and_read(plan: Plan) -> None:
     names = ("actuator.servo.leakage", "column.stiffness")
     made = ideal(with_table(plan, "tolerances", **dict.fromkeys(names, 0.05)))
     assert made.tolerances.parameters == {"column.stiffness": 0.05}

@@ -64,6 +64,6 @@ def test_a_calibration_holds_through_the_day_on_which_it_is_due(day: date, warne
         ("[report.calibration]\nx = 4", "must be a table with date and due, not 4."),
     ],
 )
-def test_a_wrong_calibration_is_one_sentence(text: str, said: str) -> None:
+def test_a_wrong_calibration_is_refused_in_one_sentence(text: str, said: str) -> None:
     with pytest.raises(PlanError, match=said):
         parse(text, Path())

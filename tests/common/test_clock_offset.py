@@ -74,7 +74,7 @@ def run(
 
 
 @given(st.integers(-(10**12), 10**12), st.integers(0, YEAR), PPM, EXCHANGES, st.booleans())
-def test_the_error_never_exceeds_the_bound(
+def test_the_error_of_the_clock_offset_never_exceeds_its_bound(
     offset: int, own: int, ppm: int, exchanges: list[tuple[int, ...]], wandering: bool
 ) -> None:
     clocks, estimate = Clocks(offset, ppm, own), ClockOffset(length=4, blocks=5)

@@ -48,7 +48,7 @@ def test_an_error_tells_a_local_from_a_remote_fault() -> None:
 
 
 @given(st.lists(st.sampled_from(Event)))
-def test_the_first_cause_stays_and_final_states_are_latched(events: list[Event]) -> None:
+def test_the_first_cause_is_kept_and_final_states_are_latched(events: list[Event]) -> None:
     exchange = Exchange()
     first = ""
     for number, event in enumerate(events):

@@ -221,7 +221,7 @@ def test_hostile_content_takes_memory_in_proportion_to_a_bounded_frame(unit: byt
     assert peak < 80 * largest
 
 
-def test_an_oversize_frame_is_not_even_hashed() -> None:
+def test_an_oversize_frame_is_rejected_without_being_hashed() -> None:
     class Untouched:
         def copy(self) -> codec.Key:
             raise AssertionError

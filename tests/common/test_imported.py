@@ -28,7 +28,7 @@ def run_with_metadata(metadata: dict[str, dict[str, str]]) -> Run:
     return Run(Path("a.mcap"), metadata=metadata)
 
 
-def test_what_is_written_is_read_back() -> None:
+def test_written_data_are_read_back_unchanged() -> None:
     stated = ImportedData("a.csv", True, {"master": {"column_force": FORCE}})
     found = imported(run_with_metadata({IMPORT: stated.metadata()}))
     assert found == stated

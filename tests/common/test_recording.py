@@ -54,7 +54,7 @@ def write(path: Path, ticks: int, storeys: int = 1, *, close: bool = True) -> Re
 
 
 @pytest.mark.parametrize("storeys", [1, 3])
-def test_what_is_written_is_read_back(tmp_path: Path, storeys: int) -> None:
+def test_written_data_are_read_back_unchanged(tmp_path: Path, storeys: int) -> None:
     path = tmp_path / "a.mcap"
     write(path, 100, storeys)
     run = read(path)
@@ -179,7 +179,7 @@ def test_the_memory_of_a_recording_does_not_grow_with_the_test(tmp_path: Path) -
     assert (after - before) / (chunks // 2) < 64.0  # bytes a chunk; objects would take 700
 
 
-def test_schemas_and_plan_are_there_before_the_first_sample(tmp_path: Path) -> None:
+def test_schemas_and_plan_are_written_before_the_first_sample(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     recording = Recording(path, "trial", 1, TOPICS)
     recording.metadata("plan", {"toml": "x"})

@@ -182,7 +182,7 @@ def reality_of(text: str, planned: Plan, tmp_path: Path) -> reality.Reality:
     return reality.load(path, planned)
 
 
-def test_a_reality_replaces_one_laboratory_and_moves_the_parameters_of_all_or_one(tmp_path: Path) -> None:
+def test_a_reality_replaces_one_laboratory_and_changes_the_parameters_of_all_or_one(tmp_path: Path) -> None:
     text = (
         "seed = 3\n[damper]\nmass = 17.0\n[slave.roof.damper]\ndamping = 9.0\n"
         "[slave.cellar.rig]\nclass = 'lab.py:Lab'\n"

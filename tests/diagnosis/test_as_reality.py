@@ -36,7 +36,9 @@ def plan_of(path: Path) -> Plan:
     return parse(read(path).metadata["plan"]["toml"], path.parent)
 
 
-def test_a_diagnosis_read_as_a_reality_is_the_same_laboratories(cases: Cases, tmp_path: Path) -> None:
+def test_a_diagnosis_that_is_read_as_a_reality_gives_the_same_laboratories(
+    cases: Cases, tmp_path: Path
+) -> None:
     path = cases.file(FRICTION, duration=4.0)
     found = examine(record.build(read(path)))
     whole = as_reality({"slave": found})

@@ -185,7 +185,7 @@ def test_late_ticks_are_counted_separately_and_are_not_an_effect() -> None:
 # -- recordings -----------------------------------------------------------------------------------
 
 
-def test_a_clean_recording_shows_nothing(virtual_recording: Path) -> None:
+def test_a_clean_recording_gives_no_effect_on_the_link(virtual_recording: Path) -> None:
     run = read(virtual_recording)
     assert findings(account(run, DT), DT) == []
     ticks = run.ticks("master")

@@ -32,7 +32,7 @@ def test_a_rounded_reading_is_found_with_its_step(cases: Cases, signal: str, ste
     assert found.ratio > 1.0
 
 
-def test_rounding_far_below_the_noise_is_no_finding(cases: Cases) -> None:
+def test_rounding_far_below_the_noise_gives_no_finding(cases: Cases) -> None:
     whole = cases.record({"sensor.column_force.quantization": {"step": 1.0}}, duration=8.0)
     assert readings.steps(whole) == {"column_force": pytest.approx(1.0)}
     assert found_in(whole) == []
@@ -97,7 +97,7 @@ def test_a_sensor_at_rest_does_not_count_as_missing_samples(cases: Cases) -> Non
     assert readings.held(record.build(run), {}) == {}
 
 
-def test_noise_and_rounding_stand_in_the_report(cases: Cases) -> None:
+def test_noise_and_rounding_are_in_the_report(cases: Cases) -> None:
     report = cases.report({"sensor.column_force.noise": {"rms": 500.0}}, duration=8.0)
     assert named(report) == ["sensor.column_force.noise"]
     assert [site["site"] for site in report["where"]] == ["sensor.column_force"]

@@ -1,4 +1,4 @@
-"""One effect in the place of two, or two in the place of one: which description of a part stands."""
+"""One effect in place of two, or two in place of one: which description of a part is chosen."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ def fit(values: dict[str, dict[str, float]], off: Array | float = 0.0) -> Fit:
     return Fit(DATA, values, np.zeros(0), NOISY + off)
 
 
-def test_of_two_descriptions_that_predict_the_same_the_one_with_fewer_free_parameters_stands() -> None:
+def test_if_two_descriptions_predict_the_same_the_one_with_fewer_free_parameters_is_chosen() -> None:
     one, two = fit(SIDED), fit(PAIR, 1e-4)
     for both in ([one, two], [two, one]):
         assert simplest(both) == (two, (one,))
 
 
-def test_a_description_that_fits_better_stands_however_many_parameters_it_has() -> None:
+def test_a_description_that_fits_better_is_chosen_whatever_its_number_of_parameters() -> None:
     one, two = fit(SIDED), fit(PAIR, 0.2)
     assert simplest([two, one]) == (one, ())
 
 
-def test_fits_that_miss_the_data_as_far_in_different_ways_are_not_the_same() -> None:
+def test_fits_with_equal_costs_and_different_residuals_are_not_tied() -> None:
     miss = np.where(np.arange(DATA.groups)[:, None] % 2, 1.0, -1.0)
     one, two = (fit(PAIR, sign * miss - NOISY) for sign in (1.0, -1.0))
     assert one.cost == two.cost
     assert not tied(one, two)
 
 
-def test_a_description_is_told_with_its_laws() -> None:
+def test_a_description_is_written_with_its_laws() -> None:
     assert described(fit(SIDED)) == "damper.friction (law by direction and speed)"
     assert described(fit(PAIR)) == "damper.friction with sensor.column_force.bias"

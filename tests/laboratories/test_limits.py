@@ -54,7 +54,7 @@ def test_limits_apply_by_name_and_refuse_nan() -> None:
     assert first_beyond(limited({}, ("other",)), (math.nan,)) is None
 
 
-def test_a_tick_names_the_first_value_beyond_its_limit() -> None:
+def test_the_check_of_a_tick_names_the_first_value_beyond_its_limit() -> None:
     limits = tick_limits(COLUMN, replace(Plan(), limits=Limits(column_force=10.0, actuator_step=1e-3)))
     assert limits.violation(0.0, 0.0, -10.0, 0.0) is None
     assert limits.violation(0.0, 0.0, -10.1, 2e-3) == LimitViolation("column_force", -10.1, 10.0, "N")
@@ -162,7 +162,7 @@ def noisy(count: int) -> np.ndarray:
     return np.random.default_rng(1).normal(0.0, NOISE, count)
 
 
-def test_a_sensor_that_freezes_is_found_after_so_many_equal_readings() -> None:
+def test_a_sensor_that_freezes_is_found_after_the_set_number_of_equal_readings() -> None:
     values = noisy(100)
     values[60:] = values[60]
     tick, found = watched(values)

@@ -131,7 +131,7 @@ def test_each_reading_has_its_own_delay() -> None:
     assert np.allclose(rows.T, [np.maximum(ramp - 1.0, 0.0), np.maximum(ramp - 4.0, 0.0)])
 
 
-def test_noise_is_not_lagged() -> None:
+def test_a_sensors_lag_does_not_affect_its_noise() -> None:
     values, noises = np.sin(np.arange(50.0)), np.cos(3.0 * np.arange(50.0))
     more = SensorEffects(gain=0.9, lag=0.02)
     assert np.allclose(read(values, more, noises) - read(values, more), noises, atol=1e-12)

@@ -62,7 +62,7 @@ def test_a_plan_with_less_than_the_required_delay_margin_is_refused(default_plan
     assert partition_check(default_plan, early).risk is None
 
 
-def test_an_unstable_plan_is_refused_by_partition_and_peaks(default_plan: Plan) -> None:
+def test_an_unstable_plan_is_refused_by_the_checks_of_partition_and_peaks(default_plan: Plan) -> None:
     plan = dataclasses.replace(uncompensated(default_plan), control=Control(amd=False))
     risks = [one.risk for one in preflight.checks(plan) if one.risk]
     assert [risk.name for risk in risks] == ["partition", "peaks"]

@@ -76,7 +76,7 @@ def test_a_realitys_effect_appears_in_the_bench_recording_and_its_name_does_not(
     assert report["parameters"]["delay"]["value"] == pytest.approx(0.020, abs=2e-4)
 
 
-def test_a_limit_stops_a_bench_test_and_the_recording_stays(
+def test_a_limit_stops_a_bench_test_and_the_recording_is_kept(
     call: Any,
     capsys: Any,
     tmp_path: Path,

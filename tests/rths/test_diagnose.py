@@ -203,7 +203,7 @@ def test_a_bench_test_of_one_part_is_diagnosed(
 
 
 @pytest.mark.slow
-def test_the_gap_of_a_bench_test_closes_to_its_floor(call: Any, tmp_path: Path) -> None:
+def test_the_gap_of_a_bench_test_closes_to_the_noise_floor(call: Any, tmp_path: Path) -> None:
     path, out, secret = tmp_path / "bench.mcap", tmp_path / "a.json", tmp_path / "r.toml"
     secret.write_text("[[effect]]\nname = 'table.gain'\nfactor = 0.93\n")
     assert call("bench", "table", "default", "-o", path, "--reality", secret) == 0

@@ -152,7 +152,7 @@ def test_the_disk_is_measured_in_the_nearest_existing_folder_and_no_file_remains
     assert disk.measure(Path("/proc"), 0.0)["error"]
 
 
-def test_a_file_in_the_way_of_the_folder_is_refused(tmp_path: Path) -> None:
+def test_a_file_with_the_name_of_the_output_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="is a file"):
         disk.nearest(tmp_path / "file" / "runs")

@@ -102,7 +102,7 @@ def test_files_with_semicolons_decimal_commas_a_preamble_and_a_row_of_units_are_
     assert "a map can give its separator, decimal sign and rows to skip" in capsys.readouterr().err
 
 
-def test_start_and_stop_cut_the_data(bring: Any) -> None:
+def test_start_and_stop_select_a_part_of_the_data(bring: Any) -> None:
     code, run = bring(table("t,u,y", TIMES, COMMAND, LATE), DRIVE, 'time = "t"\nstart = 1.0\nstop = 2.0\n')
     assert code == 0
     displacement = run.columns["master"]["column_displacement"]

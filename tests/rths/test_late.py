@@ -69,7 +69,7 @@ def test_without_recorded_latency_late_ticks_are_not_mentioned(virtual_recording
     assert late.warning(None) == ""
 
 
-def test_beside_a_client_late_ticks_are_counted_by_cause(virtual_recording: Path, capsys: Any) -> None:
+def test_with_a_client_late_ticks_are_counted_by_cause(virtual_recording: Path, capsys: Any) -> None:
     run = read(virtual_recording)
     ticks = len(run.columns["master"]["t"])
     woke, late = np.full(ticks, 80e-6), np.zeros(ticks, dtype=bool)

@@ -262,7 +262,7 @@ def test_ctrl_c_within_generated_code_gives_exit_code_3(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (3, "", "rths: stopped by the user.\n")
 
 
-def test_a_file_that_is_not_there_leaves_no_folder_behind(call: Call, tmp_path: Path) -> None:
+def test_a_missing_input_file_leaves_no_output_folder(call: Call, tmp_path: Path) -> None:
     assert call("plot {tmp}/nosuch.mcap") == 2
     assert list(tmp_path.iterdir()) == []
 

@@ -112,7 +112,9 @@ def test_a_low_terminal_shows_the_lines_that_fit(terminal: Terminal, monkeypatch
 
 
 @pytest.mark.parametrize(("value", "colours"), [("", True), ("1", False)])
-def test_no_color_is_honoured(value: str, colours: bool, terminal: Terminal, monkeypatch: Any) -> None:
+def test_the_variable_no_color_is_respected(
+    value: str, colours: bool, terminal: Terminal, monkeypatch: Any
+) -> None:
     monkeypatch.setenv("NO_COLOR", value)
     progress = RunProgress(40.0, terminal)
     progress.show(REPORT)

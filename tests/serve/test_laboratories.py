@@ -98,7 +98,7 @@ def test_a_users_rig_is_served_as_an_element(tmp_path: Path) -> None:
     assert columns["master"]["column_displacement"][1:STEPS] == pytest.approx(0.5 * places[:-1], rel=1e-12)
 
 
-def test_a_step_in_which_one_element_moves_is_one_step_of_the_other_at_rest(tmp_path: Path) -> None:
+def test_a_step_of_one_moving_element_is_a_step_at_rest_of_the_other(tmp_path: Path) -> None:
     """Within a step OpenSees tells all elements their displacements, then asks all for forces, then commits all."""
     moves = [1e-4 * step for step in range(1, 21)]
 

@@ -111,7 +111,9 @@ def test_two_laboratories_are_served_as_one_element_or_as_two(
 
 
 @pytest.mark.parametrize("integrator", [*EXPLICIT, "Newmark"])
-def test_every_step_of_an_analysis_is_one_of_the_test_at_rest_too(integrator: str, tmp_path: Path) -> None:
+def test_every_step_of_an_analysis_is_one_step_of_the_test_also_at_rest(
+    integrator: str, tmp_path: Path
+) -> None:
     """A static analysis that moves nothing, a motion that begins with zeros, then the motion."""
     error, found, run = served(tmp_path, plan_of(), integrator, rest=REST)
     assert error is None

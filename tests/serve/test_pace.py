@@ -1,4 +1,4 @@
-"""Whose lateness it is where a tick in real time has no displacement: the client's, or that of the tick itself."""
+"""A tick in real time without a displacement is attributed to the client or to the lateness of the tick itself."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ LAB = cast(Any, SimpleNamespace(tick_ns=lambda tick: tick * INTERVAL_NS))
         (-1.0, True),  # the client has its forces since the tick before
     ],
 )
-def test_a_client_with_less_than_half_of_its_share_is_not_late(since: float, fair: bool) -> None:
+def test_a_client_that_got_less_than_half_of_its_share_of_the_tick_does_not_count_as_late(
+    since: float, fair: bool
+) -> None:
     assert plan_of().link.wait_share == SHARE
     given = 5 * INTERVAL_NS + round(since * INTERVAL_NS)
     assert RealTime(plan_of()).fair(LAB, 5, given) is fair
@@ -43,7 +45,7 @@ class Unfair(Ticking):
 
 
 @pytest.mark.parametrize("pace", [Ticking, Unfair])
-def test_a_tick_without_a_displacement_is_the_clients_where_it_had_time(
+def test_a_tick_without_a_displacement_is_attributed_to_the_client_if_it_had_time(
     pace: type[Ticking], tmp_path: Path
 ) -> None:
     def stalls(port: int) -> None:

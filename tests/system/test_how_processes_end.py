@@ -56,7 +56,7 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @pytest.mark.slow
 @LINUX
 @pytest.mark.parametrize("seconds", [0.0, 0.7])
-def test_ctrl_c_in_the_first_moments_ends_soon(seconds: float, tmp_path: Path) -> None:
+def test_ctrl_c_during_the_start_ends_a_run_soon(seconds: float, tmp_path: Path) -> None:
     process = start("run", patient(tmp_path), "--duration", "60", "-o", tmp_path / "a.mcap")
     crew(process)
     time.sleep(seconds)

@@ -1,4 +1,4 @@
-"""The operator's panel in a real browser: a thousand stops, the keyboard alone, a phone, a screen reader's names."""
+"""The operator's panel in a real browser: a thousand stops, use by keyboard, a phone's width, a screen reader."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_an_operator_without_a_mouse_stops_a_test_with_a_reason(panels: Panels, 
     panels.end()
 
 
-def test_a_screen_reader_finds_names_roles_and_news(panels: Panels, short_plan: Plan) -> None:
+def test_a_screen_reader_finds_names_roles_and_announcements(panels: Panels, short_plan: Plan) -> None:
     labs = StandIn(with_test(short_plan, seed=7))
     url = panels.start()
     with labs.there(), open_page(url) as page:
@@ -143,7 +143,7 @@ def test_a_screen_reader_finds_names_roles_and_news(panels: Panels, short_plan: 
         page.wait("document.getElementById('phase').textContent.endsWith(' ago)')", HANG_S)
 
 
-def test_two_browsers_see_each_others_orders_and_a_page_of_a_dead_panel_orders_nothing(
+def test_two_browsers_see_each_others_orders_and_a_page_of_an_ended_panel_gives_none(
     panels: Panels, short_plan: Plan
 ) -> None:
     labs = StandIn(with_test(short_plan, seed=8))

@@ -100,7 +100,7 @@ def test_a_step_of_central_difference_commits_before_it_asks_for_the_force() -> 
     assert one.phase is Phase.WANTED
 
 
-def test_a_step_that_leaves_the_displacement_is_a_step_at_rest_from_its_commit_on() -> None:
+def test_a_step_without_a_change_of_displacement_is_a_step_at_rest_from_its_commit_on() -> None:
     """Before the commit the integrator may still change it, so the force is that of the previous step."""
     one = server()
     for step in range(1, 4):
@@ -113,7 +113,7 @@ def test_a_step_that_leaves_the_displacement_is_a_step_at_rest_from_its_commit_o
     assert (one.steps, one.commits) == (3, 3)
 
 
-def test_a_step_that_changes_the_displacement_after_its_force_is_one_step() -> None:
+def test_a_step_that_changes_the_displacement_after_its_force_counts_as_one_step() -> None:
     """Newmark with algorithm('Linear'): the predictor repeats the displacement, and the solution changes it."""
     one = server()
     for step, x in enumerate((0.0, 1e-3, 1e-3, 2e-3), 1):
@@ -125,7 +125,7 @@ def test_a_step_that_changes_the_displacement_after_its_force_is_one_step() -> N
     assert (one.steps, one.commits) == (4, 4)
 
 
-def test_steps_at_rest_of_a_client_that_does_not_wait_come_one_after_the_other() -> None:
+def test_steps_at_rest_of_a_client_that_does_not_wait_are_made_in_order() -> None:
     one = server()
     one.take((said(MessageCode.TRIAL, 1e-3) + said(MessageCode.COMMIT)) * 3 + said(MessageCode.END))
     found = 0

@@ -120,7 +120,7 @@ def test_each_effect_is_defined_in_the_file_that_its_name_gives(effect: Effect) 
 
 
 @pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
-def test_names_sites_and_kinds_agree(effect: Effect) -> None:
+def test_names_sites_and_kinds_of_effects_agree(effect: Effect) -> None:
     is_sensor = bool(effect.signal)
     assert effect.name.rsplit(".", 1)[0] == effect.site
     assert effect.site in SITES
@@ -154,7 +154,7 @@ def test_hints_for_the_search_refer_to_existing_parameters_and_signals(effect: E
 
 
 @EACH
-def test_null_parameters_leave_the_system_as_it_was(effect: Effect) -> None:
+def test_null_parameters_do_not_change_the_system(effect: Effect) -> None:
     assert lay(BASE, [(effect.name, null_parameters(effect))]) == BASE
 
 

@@ -82,7 +82,7 @@ KNET_TEXT = "\n".join(KNET) + "\n1 3\n"
         ),
     ],
 )
-def test_the_reader_follows_from_suffix_or_content(tmp_path: Path, file: str, text: str, name: str) -> None:
+def test_the_reader_is_chosen_by_suffix_or_content(tmp_path: Path, file: str, text: str, name: str) -> None:
     (tmp_path / file).write_text(text)
     assert load(file, tmp_path).name == name
 

@@ -70,7 +70,7 @@ class TestRegistry:
         np.testing.assert_allclose(first[VELOCITY], problem.v0, rtol=1e-10)
 
     @EVERY
-    def test_rest_stays_at_rest(self, name: str, options: dict[str, float]) -> None:
+    def test_a_structure_at_rest_stays_at_rest(self, name: str, options: dict[str, float]) -> None:
         problem = three()
         method = integrators.build(name, problem.M, problem.C, problem.K, 0.002, **options)
         s, zero = integrators.rest(3), np.zeros(3)

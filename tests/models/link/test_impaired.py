@@ -29,7 +29,7 @@ def runs(lost: list[bool]) -> list[int]:
     return [len(list(group)) for gone, group in groupby(lost) if gone]
 
 
-def test_without_impairment_nothing_happens() -> None:
+def test_without_impairment_no_message_is_delayed_or_lost() -> None:
     link = ImpairedLink(seed=3)
     assert set(fates(link)) == {0.0}
     found, planned = exchange(500, INTERVAL, link), on_time(500)

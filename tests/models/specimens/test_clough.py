@@ -98,7 +98,9 @@ def test_forces_are_finite_independent_of_steps_and_never_return_work(
 
 
 @given(DEFORMATIONS, st.floats(0.0, 0.5), st.floats(0.0, 1.0))
-def test_work_is_never_negative(corners: list[float], hardening: float, unloading: float) -> None:
+def test_the_work_of_a_clough_column_is_never_negative(
+    corners: list[float], hardening: float, unloading: float
+) -> None:
     path = through([0.0, *corners], 400)
     force = forces(path, stiffness=K, yield_displacement=DY, hardening=hardening, unloading=unloading)
     work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(path))

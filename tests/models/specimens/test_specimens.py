@@ -244,7 +244,7 @@ class TestBoucWen:
         expected = alpha * K * far + (1.0 - alpha) * K * DY * bound
         np.testing.assert_allclose(force, [expected, -expected], rtol=1e-12)
 
-    def test_large_n_approaches_bilinear(self) -> None:
+    def test_bouc_wen_with_a_large_n_approaches_bilinear(self) -> None:
         path = cycles(3 * DY, 2, 100)
         expected = forces("bilinear", path, hardening=0.05)
         gaps = [

@@ -89,7 +89,7 @@ def test_only_changed_recordings_are_read_again(folder: Path, tmp_path: Path) ->
     assert "must hold `notes`" in facts["notes"]
 
 
-def test_an_interrupted_renewal_leaves_the_catalogue_as_it_was(folder: Path, tmp_path: Path) -> None:
+def test_an_interrupted_renewal_does_not_change_the_catalogue(folder: Path, tmp_path: Path) -> None:
     place = shutil.copytree(folder, tmp_path / "copy")
     renewal.renew([place])
     shutil.copy(place / "cut.mcap", place / "more.mcap")
@@ -162,7 +162,7 @@ def test_a_text_in_a_condition_is_never_taken_for_sql(text: str, name: str) -> N
     memory.close()
 
 
-def test_the_command_catalogues_finds_and_shows(call: Call, capsys: Any, folder: Path) -> None:
+def test_the_command_catalogues_finds_and_shows_recordings(call: Call, capsys: Any, folder: Path) -> None:
     assert call("catalog", folder, "--json") == 0
     assert json.loads(capsys.readouterr().out)["recordings"] == 4
     assert call("catalog", "find", "peak drift > 1 mm and state = whole", "--in", folder) == 0
@@ -213,7 +213,7 @@ def test_a_file_that_is_not_a_catalogue_is_refused_in_one_sentence(
     assert "Cannot use the catalogue" in capsys.readouterr().err
 
 
-def test_the_page_sorts_and_filters(call: Call, folder: Path, tmp_path: Path) -> None:
+def test_the_page_of_the_catalogue_sorts_and_filters(call: Call, folder: Path, tmp_path: Path) -> None:
     if browser.chromium() is None:
         pytest.skip("there is no Chromium on this machine")
     path = tmp_path / "tests.html"

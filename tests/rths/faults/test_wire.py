@@ -106,7 +106,7 @@ def test_an_outage_queues_frames_as_tcp_does_or_loses_them(state: str, there: in
     assert found.numbers() == sorted(found.numbers())
 
 
-def test_a_backlog_is_bounded() -> None:
+def test_the_backlog_of_a_link_is_bounded() -> None:
     found = line(Conditions(state=QUEUES))
     found.send(BACKLOG + 7)
     found.world.at(10_000 * MS, found.direction.lift, "given")

@@ -46,7 +46,7 @@ def check(report: BudgetReport, name: str) -> BudgetCheck:
 
 @pytest.mark.parametrize("ticks", [2500, 20_000])
 @pytest.mark.parametrize("scheduler", list(noisy.SPIKES))
-def test_clean_recordings_are_within_and_delayed_ones_over_ten_times_out_of_ten(
+def test_clean_recordings_are_judged_within_and_delayed_ones_over_in_ten_of_ten_draws(
     ticks: int, scheduler: str
 ) -> None:
     clean = [verdict(noisy.clean(seed, ticks, scheduler)).status for seed in range(10)]

@@ -20,7 +20,7 @@ def test_the_shipped_budget_limits_both_directions_and_late_ticks() -> None:
         assert budget.segments[segment]["p99"] + budget.machine.lateness < 1e-3
 
 
-def test_a_budget_limits_only_what_it_names(tmp_path: Path) -> None:
+def test_a_budget_limits_only_the_figures_that_it_names(tmp_path: Path) -> None:
     path = tmp_path / "b.toml"
     path.write_text('[round_trip]\n"p99.9" = 2e-3\np50 = 1e-3\n')
     budget = load(path)

@@ -45,7 +45,7 @@ class Growing:
         self._content = content
 
     def to(self, share: float) -> None:
-        """Let a share of the file be there, and bring the page up to date."""
+        """Let the file grow to this share of its length, and update the page."""
         self.path.write_bytes(self._content[: round(share * len(self._content))])
         self.feed.look()
         while self.feed.behind:
@@ -152,7 +152,7 @@ def test_events_and_modes_are_shown(growing: Growing) -> None:
     assert events.index("running → ramping (end)") < events.index("recording begun")
 
 
-def test_a_window_bounds_what_a_page_holds(virtual_recording: Path, grow: Grow) -> None:
+def test_a_window_bounds_the_samples_of_a_page(virtual_recording: Path, grow: Grow) -> None:
     growing = grow(virtual_recording.read_bytes(), window=1.0)
     for share in (0.4, 0.7, 1.0):
         growing.to(share)

@@ -1,4 +1,4 @@
-"""The desk of the panel without a browser: numbers, replays, second pages, old wishes, plans that differ."""
+"""The panel's desk without a browser: numbered orders, replays, several pages, outdated orders, differing plans."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOVING = [word for word, one in WORDS.items() if one.moves]
 
 
 class Recorded:
-    """Hands that do nothing but note what they were asked to do."""
+    """Hands that only record the orders that they are given."""
 
     def __init__(self) -> None:
         self.present = Present("a-1", PLAN, PLAN)
@@ -58,7 +58,7 @@ def counter() -> Counter:
 
 
 @pytest.mark.parametrize("word", WORDS)
-def test_a_number_is_carried_out_once_whatever_its_repetition_says(word: str, counter: Counter) -> None:
+def test_an_order_is_carried_out_once_whatever_its_repetition_contains(word: str, counter: Counter) -> None:
     first = counter.give(word, 1)
     assert counter.hands.did == [word]
     for other in WORDS:
@@ -67,7 +67,7 @@ def test_a_number_is_carried_out_once_whatever_its_repetition_says(word: str, co
     assert first.outcome == Outcome("done", "1")
 
 
-def test_a_refusal_is_kept_too(counter: Counter) -> None:
+def test_a_refused_order_stays_refused_when_repeated(counter: Counter) -> None:
     refused = counter.give("start", 1, digest=OTHER)
     assert refused.outcome.state == "refused"
     assert counter.give("start", 1) is refused
@@ -75,7 +75,9 @@ def test_a_refusal_is_kept_too(counter: Counter) -> None:
 
 
 @pytest.mark.parametrize("word", MOVING)
-def test_what_moves_a_rig_must_be_a_fresh_wish(word: str, counter: Counter) -> None:
+def test_an_order_that_moves_a_rig_must_be_recent_and_for_the_present_test(
+    word: str, counter: Counter
+) -> None:
     late = round(FRESH_S * 1e3) + 1
     assert "3 s old" in counter.give(word, 1, seen=counter.now - late).outcome.text
     assert counter.give(word, 2, seen=counter.now + 1).outcome.state == "refused"  # of another panel's clock
@@ -96,7 +98,9 @@ def test_a_start_and_arming_need_the_plan_that_was_shown(counter: Counter) -> No
 
 
 @pytest.mark.parametrize("word", STOPS)
-def test_a_stop_counts_out_of_turn_and_late_but_not_for_another_test(word: str, counter: Counter) -> None:
+def test_a_stop_is_accepted_out_of_order_or_late_but_not_for_another_test(
+    word: str, counter: Counter
+) -> None:
     counter.give("stop", 9)
     assert counter.give(word, 3).outcome.state == "done"
     assert counter.give(word, 4, test="b-2").outcome.state == "done"  # the page is about to learn of this one
@@ -106,7 +110,7 @@ def test_a_stop_counts_out_of_turn_and_late_but_not_for_another_test(word: str, 
     assert counter.give(word, 7).outcome.text == "No test runs on this machine."
 
 
-def test_a_page_of_an_earlier_panel_orders_nothing(counter: Counter) -> None:
+def test_orders_from_a_page_of_an_earlier_panel_are_refused(counter: Counter) -> None:
     gone = counter.give("stop", 1, session="somebody")
     assert gone.outcome.state == "refused"
     assert "load it anew" in gone.outcome.text
@@ -114,7 +118,7 @@ def test_a_page_of_an_earlier_panel_orders_nothing(counter: Counter) -> None:
     assert list(counter.desk.newest) == []
 
 
-def test_two_pages_have_numbers_of_their_own_and_see_each_others_orders(counter: Counter) -> None:
+def test_two_pages_number_their_orders_independently_and_see_each_others(counter: Counter) -> None:
     other = counter.desk.enter()
     assert other != counter.page
     assert counter.give("stop", 1) is not counter.give("stop", 1, session=other)
@@ -122,12 +126,12 @@ def test_two_pages_have_numbers_of_their_own_and_see_each_others_orders(counter:
 
 
 @pytest.mark.parametrize("number", [0, -1, NUMBER])
-def test_a_number_that_no_page_gives_is_refused(number: int, counter: Counter) -> None:
+def test_an_order_with_an_impossible_number_is_refused(number: int, counter: Counter) -> None:
     assert counter.give("stop", number).outcome.state == "refused"
     assert counter.give("stop", 1).outcome.state == "done"
 
 
-def test_what_is_forgotten_is_not_carried_out_again(
+def test_an_order_that_is_no_longer_kept_is_not_carried_out_again(
     counter: Counter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(desks, "KEPT", 5)
@@ -137,7 +141,7 @@ def test_what_is_forgotten_is_not_carried_out_again(
     assert counter.hands.did == ["stop"] * 9
 
 
-def test_pages_that_ask_stay_and_the_longest_silent_goes(
+def test_active_pages_are_kept_and_the_page_that_was_silent_longest_is_dropped(
     counter: Counter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(desks, "PAGES", 3)
@@ -172,7 +176,7 @@ steps = st.builds(
 
 
 @given(st.lists(steps, max_size=60))
-def test_nothing_moves_that_nobody_wanted_and_no_stop_is_lost(story: list[Step]) -> None:
+def test_no_sequence_of_orders_moves_a_rig_unasked_or_loses_a_stop(story: list[Step]) -> None:
     counter = Counter()
     pages = [counter.page, counter.desk.enter(), "nobody"]
     first: dict[tuple[str, int], Entry] = {}

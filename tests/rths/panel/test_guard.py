@@ -1,4 +1,4 @@
-"""Who is answered by the panel: names, other sites, frames, tokens; and the requests that give orders."""
+"""Which requests the panel answers: names, other sites, frames, tokens; and the requests that give orders."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ JSON = {"Content-Type": "application/json"}
         (HERE | {"Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "iframe"}, False),
     ],
 )
-def test_only_the_panels_own_pages_are_answered(headers: dict[str, str], answered: bool) -> None:
+def test_only_requests_of_the_panels_own_pages_are_answered(headers: dict[str, str], answered: bool) -> None:
     assert (Guard("127.0.0.1", 5006).stranger(headers) == "") is answered
 
 
@@ -60,11 +60,13 @@ def test_only_the_panels_own_pages_are_answered(headers: dict[str, str], answere
         ({"Origin": "http://127.0.0.1:5006", "Content-Type": "text/plain"}, False),
     ],
 )
-def test_an_order_says_that_it_comes_from_a_page_of_the_panel(headers: dict[str, str], orderly: bool) -> None:
+def test_an_order_must_have_the_headers_of_a_page_of_the_panel(
+    headers: dict[str, str], orderly: bool
+) -> None:
     assert (Guard("127.0.0.1", 5006).disorderly(headers) == "") is orderly
 
 
-def test_a_panel_for_others_answers_to_its_own_name_alone_and_asks_for_the_token() -> None:
+def test_a_panel_for_other_machines_answers_only_under_its_own_name_and_requires_the_token() -> None:
     guard = Guard("192.0.2.7", 80, "secret")
     assert guard.url == "http://192.0.2.7:80/?token=secret"
     assert guard.stranger({"Host": "192.0.2.7:80"}) == ""
@@ -76,13 +78,13 @@ def test_a_panel_for_others_answers_to_its_own_name_alone_and_asks_for_the_token
     assert Guard("127.0.0.1", 80).admits("")
 
 
-def test_an_address_of_the_sixth_version_stands_in_brackets() -> None:
+def test_an_ipv6_address_is_written_in_brackets() -> None:
     guard = Guard("2001:db8::1", 80)
     assert guard.url == "http://[2001:db8::1]:80/"
     assert guard.stranger({"Host": "[2001:db8::1]:80"}) == ""
 
 
-def test_what_only_this_machine_reaches() -> None:
+def test_addresses_that_only_this_machine_reaches_are_recognized() -> None:
     assert [local(host) for host in ("localhost", "127.0.0.1", "127.0.1.1", "::1", "192.0.2.1", "lab")] == [
         *[True] * 4,
         False,
@@ -91,7 +93,7 @@ def test_what_only_this_machine_reaches() -> None:
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "", "*", "a/b", "user@host", "two words"])
-def test_a_name_that_stands_for_all_is_refused(host: str) -> None:
+def test_an_address_that_stands_for_all_interfaces_is_refused(host: str) -> None:
     with pytest.raises(InputError, match="cannot be used: give the one name or address"):
         checked(host)
 
@@ -111,7 +113,7 @@ GIVEN: dict[str, Any] = {
     "changed",
     [{"number": "1"}, {"number": True}, {"seen": 1.5}, {"more": 1}, {"word": None}, {"session": ["s"]}],
 )
-def test_what_is_no_order_is_not_understood(changed: dict[str, Any]) -> None:
+def test_a_request_that_is_not_an_order_is_rejected(changed: dict[str, Any]) -> None:
     assert understood(json.dumps(GIVEN).encode()) is not None
     assert understood(json.dumps(GIVEN | changed).encode()) is None
     for body in (b"", b"[]", b"{", b"\xff", b"[" * 100_000):
@@ -138,7 +140,7 @@ Story = Callable[[str, Desk, Hand], Awaitable[None]]
 
 
 def served(story: Story, token: str = "") -> None:
-    """Play a story against a server of its own; it is given the address, the desk and the hands."""
+    """Run a test's coroutine against a server of its own; it gets the address, the desk and the hands."""
 
     async def play() -> None:
         sockets, port = bind_unused_port()
@@ -162,7 +164,7 @@ def served(story: Story, token: str = "") -> None:
 
 
 async def ask(url: str, path: str, body: dict[str, Any] | None = None, **headers: str) -> HTTPResponse:
-    """A request; an order comes from a page of the panel unless the headers say otherwise."""
+    """The answer to a request; an order has the headers of a page of the panel unless others are given."""
     own = {"Origin": url, **JSON} if body is not None else {}
     return await AsyncHTTPClient(force_instance=True).fetch(
         url + path,
@@ -174,7 +176,7 @@ async def ask(url: str, path: str, body: dict[str, Any] | None = None, **headers
     )
 
 
-def test_a_replayed_request_gets_the_first_answer_and_moves_nothing() -> None:
+def test_a_replayed_request_gets_the_first_answer_and_is_not_carried_out_again() -> None:
     async def story(url: str, desk: Desk, hand: Hand) -> None:
         wish = GIVEN | {"session": desk.enter()}
         answers = await asyncio.gather(*(ask(url, "/order", wish) for _ in range(5)))
@@ -186,7 +188,7 @@ def test_a_replayed_request_gets_the_first_answer_and_moves_nothing() -> None:
     served(story)
 
 
-def test_strangers_order_nothing_and_read_nothing() -> None:
+def test_requests_from_other_sites_can_neither_order_nor_read() -> None:
     async def story(url: str, desk: Desk, hand: Hand) -> None:
         wish = GIVEN | {"session": desk.enter()}
         for headers in (
@@ -204,7 +206,7 @@ def test_strangers_order_nothing_and_read_nothing() -> None:
     served(story)
 
 
-def test_without_the_token_nothing_is_answered_and_with_it_a_cookie_is_given() -> None:
+def test_requests_without_the_token_are_refused_and_the_token_gives_a_cookie() -> None:
     async def story(url: str, desk: Desk, hand: Hand) -> None:
         wish = GIVEN | {"session": desk.enter()}
         for path in ("/state", "/?token=wrong", "/state?token=wrong"):

@@ -40,7 +40,7 @@ sys.stderr.write("rths: The door is open.\\n"); sys.exit(3)"""
 
 
 def until(true: Callable[[], Any]) -> Any:
-    """What a condition gives as soon as it is true."""
+    """The value of a condition as soon as it is true."""
     deadline = time.monotonic() + HANG_S
     while not (found := true()):
         assert time.monotonic() < deadline
@@ -60,7 +60,7 @@ class Desk:
 
 
 def modes(desk: Desk) -> dict[str, str]:
-    """What the laboratories of the panel's own test have reported."""
+    """The modes that the laboratories of the panel's own test have reported."""
     shown = desk.hands.snapshot.shown
     return {lab: mode for lab, (mode, _) in shown.told.modes.items()} if shown else {}
 
@@ -75,7 +75,7 @@ def desk(short_plan: Plan, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> I
 
 @pytest.fixture
 def program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[str], list[list[str]]]:
-    """Puts a program in the place of `rths`; gives the words of each call."""
+    """Puts a program in place of `rths`; gives the arguments of each call."""
 
     def put(text: str) -> list[list[str]]:
         path, calls = tmp_path / "program.py", list[list[str]]()
@@ -92,7 +92,7 @@ def program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[str], 
     return put
 
 
-def test_an_order_reaches_every_laboratory_once_and_all_answers_are_told(desk: Desk) -> None:
+def test_an_order_reaches_every_laboratory_once_and_all_answers_are_reported(desk: Desk) -> None:
     with StandIn(desk.plan).there() as labs:
         until(lambda: desk.hands.present.test)
         assert desk.hands.present.digest == desk.plan.digest()
@@ -128,7 +128,7 @@ def test_lost_frames_are_repeated_and_no_order_waits_for_the_answers_to_another(
     assert slow.result(HANG_S).text == "The test ended before all laboratories had answered."
 
 
-def test_a_test_that_ends_leaves_no_order_without_an_outcome(desk: Desk) -> None:
+def test_every_order_gets_an_outcome_when_the_test_ends(desk: Desk) -> None:
     labs = StandIn(desk.plan)
     labs.deaf = {"master", "slave"}
     with labs.there():
@@ -137,7 +137,7 @@ def test_a_test_that_ends_leaves_no_order_without_an_outcome(desk: Desk) -> None
     assert given.result(HANG_S).state == "not heard"
 
 
-def test_arming_starts_a_command_of_its_own_and_tells_when_all_are_armed(
+def test_arming_starts_a_run_command_and_reports_when_all_laboratories_are_armed(
     desk: Desk, program: Callable[[str], list[list[str]]]
 ) -> None:
     calls = program(RUN.replace("ENDING", READY))
@@ -157,7 +157,7 @@ def test_arming_starts_a_command_of_its_own_and_tells_when_all_are_armed(
     assert desk.hands.snapshot.last == ("Stopped by SIGINT.",)
 
 
-def test_a_command_that_ends_before_all_are_armed_says_why(
+def test_a_command_that_ends_before_all_are_armed_gives_its_reason(
     desk: Desk, program: Callable[[str], list[list[str]]]
 ) -> None:
     program(RUN.replace("ENDING", REFUSED))
@@ -165,7 +165,7 @@ def test_a_command_that_ends_before_all_are_armed_says_why(
     assert desk.hands.snapshot.last == ("slave: The door is open.",)
 
 
-def test_a_plan_that_has_changed_or_is_gone_is_not_armed(
+def test_a_plan_that_has_changed_or_is_missing_is_not_armed(
     desk: Desk, program: Callable[[str], list[list[str]]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = program(RUN)
@@ -181,7 +181,7 @@ def test_a_plan_that_has_changed_or_is_gone_is_not_armed(
     assert calls == []
 
 
-def test_a_test_whose_plan_is_not_the_one_that_was_checked_is_ended_before_it_moves(
+def test_a_test_with_another_plan_than_the_checked_one_is_ended_before_anything_moves(
     desk: Desk, program: Callable[[str], list[list[str]]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program(RUN.replace("ENDING", ""))
@@ -202,7 +202,7 @@ def test_a_test_whose_plan_is_not_the_one_that_was_checked_is_ended_before_it_mo
         ("", Outcome("refused", "The check ended without a word."), "The check ended without a word."),
     ],
 )
-def test_a_check_is_a_command_of_its_own(
+def test_a_check_of_the_plan_runs_the_check_command(
     text: str, outcome: Outcome, complaint: str, desk: Desk, program: Callable[[str], list[list[str]]]
 ) -> None:
     calls = program(text)
@@ -212,7 +212,7 @@ def test_a_check_is_a_command_of_its_own(
     assert desk.hands.present.armable == ("d" if not complaint else "")
 
 
-def test_hands_that_fail_leave_no_order_without_an_outcome(
+def test_if_the_panels_hands_fail_every_order_still_gets_an_outcome(
     desk: Desk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     failed: list[object] = []
@@ -228,7 +228,7 @@ def test_hands_that_fail_leave_no_order_without_an_outcome(
     assert len(failed) == 1
 
 
-def test_a_panel_that_ends_takes_an_armed_test_with_it_and_leaves_a_running_one(
+def test_a_panel_that_ends_stops_an_armed_test_and_leaves_a_running_one(
     desk: Desk, program: Callable[[str], list[list[str]]]
 ) -> None:
     program(RUN.replace("ENDING", READY))

@@ -1,4 +1,4 @@
-"""What a page of the panel is told: states, causes, bars, and how old each of them is."""
+"""The contents of a page of the panel: states, causes, bars, and the age of each."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Watched:
         self.shown: Shown | None = Shown("a-1", "a", plan, plan.digest(), path, own=True, reached=True)
 
     def to(self, share: float) -> None:
-        """Let a share of the recording be there."""
+        """Let the recording grow to this share of its length."""
         self.path.write_bytes(self._content[: round(share * len(self._content))])
         self.feed.look()
         while self.feed.behind:
@@ -81,7 +81,7 @@ def watched(tmp_path: Path, virtual_recording: Path, short_plan: Plan) -> Iterat
         yield found
 
 
-def test_without_a_test_nothing_is_shown_of_one(watched: Watched) -> None:
+def test_without_a_test_the_page_shows_no_laboratories_bars_or_causes(watched: Watched) -> None:
     watched.shown = None
     state = watched.state()
     assert state["test"] is None
@@ -91,7 +91,7 @@ def test_without_a_test_nothing_is_shown_of_one(watched: Watched) -> None:
     assert watched.view.state(Snapshot("p"), watched.feed, "somebody")["page"] == 0
 
 
-def test_an_armed_laboratorys_age_is_that_of_its_process_and_grows_with_silence(watched: Watched) -> None:
+def test_the_age_of_an_armed_laboratorys_state_is_the_time_since_its_last_report(watched: Watched) -> None:
     watched.tell(master="armed", slave="armed")
     watched.clock.time += SECOND // 2
     assert watched.labs() == {"master": ("armed", 0.5), "slave": ("armed", 0.5)}
@@ -100,7 +100,7 @@ def test_an_armed_laboratorys_age_is_that_of_its_process_and_grows_with_silence(
     assert watched.labs()["slave"] == ("armed", 30.5)
 
 
-def test_a_moving_laboratorys_age_is_that_of_its_rows_though_its_process_is_there(watched: Watched) -> None:
+def test_the_age_of_a_moving_laboratorys_state_is_that_of_its_newest_row(watched: Watched) -> None:
     watched.tell(master="running", slave="running")
     assert watched.labs()["master"] == ("running", 0.0)  # no row has come yet
     watched.to(0.5)
@@ -113,7 +113,7 @@ def test_a_moving_laboratorys_age_is_that_of_its_rows_though_its_process_is_ther
     assert all(4.9 < bar["age"] < 5.2 for bar in watched.state()["bars"])
 
 
-def test_a_process_that_has_gone_is_said_and_one_that_has_left_in_order_too(watched: Watched) -> None:
+def test_a_process_that_ended_is_shown_as_lost_or_as_left_in_order(watched: Watched) -> None:
     watched.tell(master="running", slave="running")
     watched.clock.time += SECOND
     watched.tell(alive=("master",), master="ramping")
@@ -127,7 +127,7 @@ def test_a_process_that_has_gone_is_said_and_one_that_has_left_in_order_too(watc
     assert [lab["mode"] for lab in watched.state()["labs"]] == ["left", "left"]
 
 
-def test_a_test_that_was_started_elsewhere_is_known_by_its_recording_alone(watched: Watched) -> None:
+def test_a_test_that_was_started_elsewhere_is_known_only_by_its_recording(watched: Watched) -> None:
     assert watched.shown is not None
     watched.shown = watched.shown._replace(own=False)
     state = watched.state()
@@ -136,7 +136,7 @@ def test_a_test_that_was_started_elsewhere_is_known_by_its_recording_alone(watch
     assert {mode for mode, _ in watched.labs().values()} == {"running"}
 
 
-def test_bars_stand_beside_the_limits_that_the_plan_writes(watched: Watched) -> None:
+def test_bars_are_shown_relative_to_the_limits_of_the_plan(watched: Watched) -> None:
     watched.to(0.6)
     bars = {bar["name"]: bar for bar in watched.state()["bars"]}
     assert set(bars) >= {"displacement", "column force", "table displacement", "damper stroke"}
@@ -150,7 +150,7 @@ def test_bars_stand_beside_the_limits_that_the_plan_writes(watched: Watched) -> 
     assert {bar["age"] for bar in watched.state()["bars"]} == {None}
 
 
-def test_the_largest_of_the_last_second_follows_a_motion_that_fades(watched: Watched) -> None:
+def test_the_largest_value_of_the_last_second_follows_a_decaying_motion(watched: Watched) -> None:
     watched.to(1.0)
     stroke = watched.feed.levels.of("slave", "damper_stroke")
     assert stroke is not None
@@ -158,7 +158,7 @@ def test_the_largest_of_the_last_second_follows_a_motion_that_fades(watched: Wat
     assert stroke.lately < stroke.most
 
 
-def test_causes_and_latched_laboratories_are_told(tmp_path: Path, short_plan: Plan) -> None:
+def test_causes_and_latched_laboratories_are_shown(tmp_path: Path, short_plan: Plan) -> None:
     plan = with_table(short_plan, "limits", column_force=12e3)
     made = tmp_path / "made.mcap"
     virtual.run(virtual.assemble(plan, reality.as_planned(plan), made), str)
@@ -176,13 +176,13 @@ def test_causes_and_latched_laboratories_are_told(tmp_path: Path, short_plan: Pl
         assert "column_force" in watched.state()["phase"]
 
 
-def test_before_anything_is_recorded_the_causes_are_those_that_were_reported(watched: Watched) -> None:
+def test_before_anything_is_recorded_the_reported_causes_are_shown(watched: Watched) -> None:
     assert watched.shown is not None
     watched.shown = watched.shown._replace(told=Told(causes=(("slave", "The door is open."),)))
     assert watched.state()["causes"] == [{"lab": "slave", "t": "", "text": "The door is open."}]
 
 
-def test_plan_and_machine_are_shown_as_their_commands_say_it(watched: Watched) -> None:
+def test_plan_and_machine_are_shown_with_the_results_of_their_commands(watched: Watched) -> None:
     from report.plan.facts import facts
 
     plan = plan_path(None)
@@ -206,7 +206,7 @@ def test_plan_and_machine_are_shown_as_their_commands_say_it(watched: Watched) -
     assert (busy["busy"], busy["digest"]) == (True, "")
 
 
-def test_orders_are_listed_with_the_number_of_the_page_that_sees_its_own(watched: Watched) -> None:
+def test_orders_are_listed_with_their_page_and_with_a_number_for_their_own_page(watched: Watched) -> None:
     watched.desk.take(Request(watched.page, 1, "stop", "a-1", seen=watched.clock.time // 1_000_000))
     other = watched.desk.enter()
     mine, theirs = (

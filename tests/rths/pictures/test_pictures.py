@@ -178,7 +178,7 @@ def test_single_readings_may_be_nan(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["histories", "synchronisation", "tracking", "spectra"])
-def test_a_picture_of_fewer_signals_is_lower(name: str) -> None:
+def test_a_picture_of_fewer_signals_has_a_smaller_height(name: str) -> None:
     whole, part = made_up(), made_up()
     part.columns["slave"] = {"t": part.columns["slave"]["t"]}
     del part.columns["master"]["absolute_acceleration"]

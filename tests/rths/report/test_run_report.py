@@ -91,7 +91,7 @@ def test_the_report_page_has_the_figures_of_inspect(
         assert event["text"].replace(" ", "") in text
 
 
-def test_the_page_shows_every_picture_with_its_text(reported: Path) -> None:
+def test_the_report_page_shows_every_picture_with_its_text(reported: Path) -> None:
     made = reported.read_text(encoding="utf-8")
     text = check_alone(made).text
     drawn = [picture for picture in PICTURES.values() if picture.text in text]

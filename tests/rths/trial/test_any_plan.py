@@ -180,7 +180,7 @@ def test_with_several_slaves_the_report_on_the_one_with_the_effect_counts() -> N
     assert judged("two_dampers", column, {"roof": both, "middle": both}).right
 
 
-def test_a_plan_with_a_rig_of_its_own_is_refused() -> None:
+def test_the_blind_trial_refuses_a_plan_with_a_users_rig() -> None:
     plan = plans.parse('[master.rig]\nclass = "my_lab.py:Lab"\n', ROOT)
     with pytest.raises(InputError, match="The plan names a rig: remove"):
         basis(plan)

@@ -67,7 +67,7 @@ def draw(count: int, seed: int, set_: str, *, duration: float = 30.0, **asked: A
     return draw_of(count, seed, set_, trial=replace(TRIAL, library=library, duration=duration), **asked)
 
 
-def test_a_case_is_the_same_whatever_the_count() -> None:
+def test_a_case_does_not_depend_on_the_number_of_cases() -> None:
     few, many = draw(3, 5, "judge"), draw(12, 5, "judge")
     assert many[:3] == few
     assert draw(1, 6, "judge") != few[:1]
@@ -266,7 +266,7 @@ def rounded(value: Any) -> Any:
     return [rounded(item) for item in value] if isinstance(value, list | tuple) else value
 
 
-def test_the_cases_of_the_default_test_stay_as_they_are(shipped: TrialBasis) -> None:
+def test_the_cases_of_the_default_test_are_unchanged(shipped: TrialBasis) -> None:
     cases = draw_of(20, 2026, "judge", trial=shipped)
     facts = [(case.index, case.kind, case.truths, case.seed, case.inside) for case in cases]
     tests = [

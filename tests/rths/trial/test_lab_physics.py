@@ -50,7 +50,7 @@ def test_a_yielding_column_begins_elastic_softens_and_dissipates(formula: str) -
     assert np.max(outside) < bound * 12.5e3
 
 
-def test_takeda_softens_as_it_unloads() -> None:
+def test_a_takeda_column_softens_as_it_unloads() -> None:
     ramp = np.concatenate([np.linspace(0.0, 4e-3, 2000), np.linspace(4e-3, 0.0, 2000)])
     found = play_a(effect("column.yielding", "takeda", yield_displacement=1e-3, hardening=0.0), command=ramp)
     x, f = found["column_displacement"][2600:2900], found["column_force"][2600:2900]

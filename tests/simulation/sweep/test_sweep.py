@@ -154,7 +154,7 @@ def test_a_loop_that_diverges_exceeds_every_limit() -> None:
     assert found["peak_drift"] == found["limit_share"] == np.inf
 
 
-def test_spectral_acceleration_of_a_sine_at_resonance() -> None:
+def test_the_spectral_acceleration_of_a_sine_at_resonance_agrees_with_the_closed_form() -> None:
     """The stationary response of an oscillator of ratio ζ is 1/(2ζ) times the excitation."""
     interval, period, ratio = 0.002, 0.5, 0.05
     t = interval * np.arange(20_000)
