@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from report.page import frame, render
-from report.several import pictures, tables
+from report.several import choice, pictures, tables
 from report.several.runs import ChosenSignal, OneRun
 from report.text.terminal import TitledTable
 
@@ -18,6 +18,7 @@ def page(runs: Sequence[OneRun], signals: Sequence[ChosenSignal]) -> str:
         "several.html",
         count=len(runs),
         picture=pictures.histories(runs, signals),
+        offered=choice.offered(runs, signals),
         tables=[split(one) for one in tables.all_of(runs, signals)],
     )
     return frame(f"{len(runs)} recordings", body)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,8 @@ from common.plan.plan import Plan
 from common.plan.read import with_test
 from common.reality.reality import as_planned
 from common.recording.reader import read
+from report.several import choice, runs
 from report.several import page as several_page
-from report.several import runs
 from report.text.terminal import TitledTable
 from simulation import virtual
 from tests.rths.report.pages import check_in_browser
@@ -73,6 +74,86 @@ def test_the_page_fits_screens_phones_and_paper(call: Any, three: list[Path], tm
     page = tmp_path / "all.html"
     assert call("compare", *three, "--html", page) == 0
     check_in_browser(page, tmp_path)
+
+
+CHOOSE = """() => {
+  document.querySelector('#choice summary').click();
+  const rows = [...document.querySelectorAll('.choices div')];
+  rows.find(one => one.textContent.startsWith(' ground acceleration')).querySelector('input').focus();
+}"""
+SHOWN = "() => [...document.querySelectorAll('#chosen svg')].map(one => one.getAttribute('aria-label'))"
+PEAKS = """() => [...document.querySelectorAll('#legend tbody tr')]
+  .map(one => [...one.cells].map(cell => cell.textContent))"""
+
+
+@pytest.mark.slow
+def test_signals_and_units_are_chosen_on_the_page_with_the_keyboard(
+    call: Any, three: list[Path], tmp_path: Path
+) -> None:
+    browser = pytest.importorskip("tests.browser", reason="the playwright package is not installed")
+    if browser.chromium() is None:
+        pytest.skip("there is no Chromium on this machine")
+    out = tmp_path / "all.html"
+    assert call("compare", *three, "--signals", "drift:mm", "--html", out) == 0
+    with browser.open_page(out.resolve().as_uri(), 390) as page:
+        (drift,) = page.evaluate(SHOWN)
+        assert drift.startswith("drift of all recordings in mm, from ")
+        page.evaluate(CHOOSE)
+        for key in (" ", "Tab", "g"):  # check the box, go to its unit, and choose g
+            page._page.keyboard.press(key)
+        page.wait(
+            "document.querySelectorAll('#chosen svg')[1]?.getAttribute('aria-label').includes(' in g, ')"
+        )
+        assert [text.split(" of ")[0] for text in page.evaluate(SHOWN)] == ["drift", "ground acceleration"]
+        rows = page.evaluate(PEAKS)
+        whole, _, inner = page.evaluate("() => [document.documentElement.scrollWidth, 0, window.innerWidth]")
+        assert page.errors == []
+        assert whole <= inner
+        assert page.evaluate("() => document.getElementById('words').textContent") == (
+            "--signals drift:mm,ground_acceleration:g"
+        )
+    for path, (name, *cells) in zip(three, rows, strict=True):
+        of = read(path).columns["master"]
+        assert name == path.stem
+        assert float(cells[0]) == pytest.approx(1e3 * np.abs(of["displacement"]).max(), rel=1e-3)
+        assert float(cells[1]) == pytest.approx(np.abs(of["ground_acceleration"]).max() / 9.80665, rel=1e-3)
+
+
+def test_the_extremes_that_a_page_holds_lose_no_peak() -> None:
+    time = np.arange(1000) * 0.002
+    values = np.sin(7.0 * time)
+    values[437] = 3.0
+    found = choice.extremes(time, values, float(time[-1]), 40)
+    assert found.shape == (40, 2)
+    assert np.nanmax(found) == 3.0
+    assert np.nanargmax(found[:, 1]) == int(437 / 999 * 40)
+    assert np.nanmin(found) == values.min()
+
+
+def test_what_a_recording_lacks_leaves_its_columns_empty() -> None:
+    values = np.array([0.5, np.nan, -1.0, np.nan])
+    found = choice.extremes(np.arange(4.0), values, 8.0, 8)
+    assert np.flatnonzero(np.isfinite(found[:, 0])).tolist() == [0, 2]
+    whole = np.frombuffer(base64.b64decode(choice.packed(found, 1.0)), "<i2").reshape(8, 2)
+    assert whole[2].tolist() == [-choice.FULL, -choice.FULL]
+    assert whole[1].tolist() == [choice.NONE, choice.NONE]
+
+
+def test_the_histories_of_a_page_are_bounded_however_many_there_are(three: list[Path]) -> None:
+    found = runs.several(three)[:1] * runs.MOST
+    offered = choice.offered(found, runs.chosen(found, []))
+    held = sum(len(one) for signal in offered["signals"] for one in signal["histories"])
+    assert choice.BUDGET < held < 4 / 3 * choice.BUDGET * 1.01
+    assert len(offered["signals"][0]["histories"]) == runs.MOST
+    alone = choice.offered(found[:1], runs.chosen(found, []))
+    assert alone["columns"] == choice.COLUMNS
+    assert next(one for one in alone["signals"] if one["name"] == "drift")["units"] == {
+        "m": 1.0,
+        "cm": 1e-2,
+        "mm": 1e-3,
+        "µm": 1e-6,
+        "in": 0.0254,
+    }
 
 
 @pytest.mark.parametrize(
