@@ -10,6 +10,7 @@ import numpy as np
 
 from common.errors import InputError
 from common.plan import read as plans
+from common.recording.holds import before_hold
 from common.recording.reader import read
 from common.recording.run import Run, Values
 from common.roles import MASTER, name_of
@@ -56,11 +57,12 @@ def simulated(path: Path) -> ComparedRun:
 
 
 def recorded(run: Run) -> ComparedRun:
-    """The signals of a recording at the ticks that master and slaves have in common.
+    """The signals of a recording, up to its first hold, at the ticks that master and slaves have in common.
 
     Raises:
         InputError: it holds no ticks of a master or a slave.
     """
+    run, held = before_hold(run)
     topics = [topic for topic in (MASTER, *run.roles) if run.has(topic)]
     if not topics:
         raise InputError(f"{run.path} holds no ticks of a master or a slave to compare.")
@@ -75,4 +77,5 @@ def recorded(run: Run) -> ComparedRun:
                 values[f"{name_of(topic)}.{name}"] = column[chosen]
     motion = run.metadata.get("ground_motion")
     line = f"{motion['record']}, scaled by {motion['scale']}" if motion else "ground motion not recorded"
+    line += f"; held at {held:.3f} s, and compared up to there" if held is not None else ""
     return ComparedRun(ticks, values, line)

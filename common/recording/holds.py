@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from common.earthquake_time import EarthquakeTime
 from common.recording.run import Run
 from common.roles import MASTER
@@ -63,6 +65,17 @@ def before(run: Run, tick: int) -> Run:
         sequences={topic: numbers[there[topic]] for topic, numbers in run.sequences.items()},
         log_ns={topic: stamps[there[topic]] for topic, stamps in run.log_ns.items()},
     )
+
+
+def before_hold(run: Run) -> tuple[Run, float | None]:
+    """The part of a recording before its first hold, and the test time (s) of that; all of it where there is none."""
+    ordered = (event["t"] for event in run.events if event["lab"] == MASTER and event["code"] == HOLD)
+    first, columns = next(ordered, None), run.columns.get(MASTER, {})
+    if first is None or "t" not in columns:
+        return run, None
+    numbers = run.sequences[MASTER]
+    begun = int(np.searchsorted(columns["t"], first - 1e-9))
+    return (before(run, int(numbers[begun])), first) if begun < numbers.size else (run, first)
 
 
 def places(found: Iterable[Hold], ticks: int) -> list[float]:

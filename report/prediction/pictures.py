@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from common.plan.plan import Plan
 from common.roles import MASTER, name_of
 from laboratories.kinds import kinds_of
 from loop.closed_loop import Rollout
@@ -31,7 +32,7 @@ def histories(found: Prediction) -> DrawnPicture:
 
 def png(found: Prediction, width: float) -> tuple[bytes, tuple[int, int]]:
     """The picture's file and its CSS pixels."""
-    shown = rows(found)
+    shown = rows(found.plan)
     canvas = figure.figure(width, 0.45 + ROW * len(shown))
     axes = canvas.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     time = np.arange(found.middle.ticks, dtype=np.float64) * found.plan.test.interval
@@ -39,6 +40,11 @@ def png(found: Prediction, width: float) -> tuple[bytes, tuple[int, int]]:
         row(axis, time, [series(one, role, name) for one in (found.low, found.middle, found.high)], unit)
         axis.set_ylabel(f"{label}\n{axis_scale(peak(found, role, name), unit)[1]}")
         axis.margins(x=0.01)
+    return as_png(canvas, axes)
+
+
+def as_png(canvas: Any, axes: Any) -> tuple[bytes, tuple[int, int]]:
+    """A figure whose `axes` stand above each other over the time: its file and its CSS pixels."""
     axes[-1].set_xlabel("time, s")
     canvas.align_ylabels(axes)
     stream = io.BytesIO()
@@ -66,9 +72,8 @@ def peak(found: Prediction, role: str, name: str) -> float:
     return float(max(np.max(np.abs(series(one, role, name))) for one in (found.low, found.high)))
 
 
-def rows(found: Prediction) -> list[tuple[str, str, str, str]]:
+def rows(plan: Plan) -> list[tuple[str, str, str, str]]:
     """Label, unit, role and name of every row."""
-    plan = found.plan
     result = [("top floor" if plan.storeys > 1 else "floor", "m", MASTER, "displacement")]
     for role, kind in kinds_of(plan).items():
         units = {row.name: row.unit for row in kind.channels.measured}

@@ -21,7 +21,12 @@ def sentences(found: Held) -> list[str]:
         "The test and the prediction have different plans, so a part of what lies outside the band may come from that "
         "difference."
     )
-    return [*verdict(found), *peaks(found), *([] if found.same_plan else [other])]
+    stood = (
+        []
+        if found.stood is None
+        else [f"The test was held at {found.stood:.3f} s, and is compared up to there."]
+    )
+    return [*verdict(found), *peaks(found), *([] if found.same_plan else [other]), *stood]
 
 
 def verdict(found: Held) -> list[str]:

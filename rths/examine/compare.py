@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from simulation.source import ComparedRun
 
 TABLES = (".csv", ".parquet")  # formats that hold the texts of a column
+BESIDE = ".mcap"  # format of a test and its prediction in one file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,10 +42,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "drift:mm,column_force (default: drifts, positions and forces)",
     )
     parser.add_argument(
-        "--html", type=Path, metavar="OUT", help="write a page on the recordings, with their histories"
+        "--html",
+        type=Path,
+        metavar="OUT",
+        help="write a page on the recordings, with their histories; with --predicted over the band",
     )
     cli.output_argument(
-        parser, "OUT", "write the signals of all recordings over the time since the start: .csv or .parquet"
+        parser,
+        "OUT",
+        "write the signals of all recordings over the time since the start: .csv or .parquet; with --predicted the "
+        "test and its prediction in one .mcap",
     )
     cli.force_argument(parser)
     parser.add_argument(
@@ -150,26 +157,39 @@ def write_tables(listed: Sequence[TitledTable], stream: TextIO) -> None:
 
 def against_prediction(args: argparse.Namespace) -> int:
     """Report which signals of a recording left the predicted band; 1 if the prediction did not hold."""
-    if args.html or args.output or args.signals:
-        raise InputError(
-            "--html, -o and --signals are of several recordings: leave them out with --predicted."
-        )
+    if args.signals:
+        raise InputError("--signals is of several recordings: leave it out with --predicted.")
+    if args.output and args.output.suffix.lower() != BESIDE:
+        raise InputError(f"With --predicted -o takes a recording: give a file that ends in {BESIDE}.")
+    for path in filter(None, (args.html, args.output)):
+        outputs.checked(path, args.force, [Path(args.a), args.predicted])
     if args.tolerance is not None:
         raise InputError("--tolerance is of two recordings: leave it out with --predicted, which has a band.")
     from common.recording.reader import read
     from simulation.prediction import held
 
-    found = held.held(read(Path(args.a)), read(args.predicted))
+    measured, predicted = read(Path(args.a)), read(args.predicted)
+    found = held.held(measured, predicted)
+    if args.html:
+        from report.prediction import overlay
+
+        outputs.write_text(args.html, overlay.page(found, measured, predicted), args.force)
+    if args.output:
+        from simulation.prediction import beside
+
+        with outputs.writing(args.output, args.force) as path:
+            beside.write(path, measured, predicted)
+    stream = outputs.aside(args.output, args.html)
     if args.json:
         from report.prediction import said
 
-        sys.stdout.write(json.dumps(held.plain(found) | {"sentences": said.sentences(found)}) + "\n")
+        stream.write(json.dumps(held.plain(found) | {"sentences": said.sentences(found)}) + "\n")
     else:
-        show_held(found)
+        show_held(found, stream)
     return 0 if found.held else 1
 
 
-def show_held(found: Held) -> None:
+def show_held(found: Held, stream: TextIO) -> None:
     """How a recording lay in a prediction, as text."""
     from report.prediction import said
     from report.text.terminal import table
@@ -179,9 +199,9 @@ def show_held(found: Held) -> None:
         first = f"{one.departures[0].start:.2f} s" if one.departures else "–"
         far = [f"{one.farthest:.1f} half widths", f"{one.farthest_at:.2f} s"] if one.farthest else ["–", "–"]
         rows.append([name, f"{100 * one.inside:.0f} %", first, str(len(one.departures)), *far])
-    sys.stdout.write(f"{found.ticks} ticks in common; the band is of 90 % of the time\n\n")
-    table(rows)
-    sys.stdout.write("\n" + "".join(f"{shown(text)}\n" for text in said.sentences(found)))
+    stream.write(f"{found.ticks} ticks in common; the band is of 90 % of the time\n\n")
+    table(rows, stream)
+    stream.write("\n" + "".join(f"{shown(text)}\n" for text in said.sentences(found)))
 
 
 def compare(a: ComparedRun, b: ComparedRun) -> dict[str, Any]:

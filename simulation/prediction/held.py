@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from common.errors import InputError
+from common.recording.holds import before_hold
 from common.recording.run import Run, Values
 from common.roles import MASTER, name_of
 from simulation.prediction import file
@@ -64,10 +65,11 @@ class Held(NamedTuple):
     held: bool  # whether the prediction held
     figures: Mapping[str, Any]  # those that the prediction's file holds
     same_plan: bool  # whether the test and the prediction have the same plan
+    stood: float | None = None  # test time (s) of the first hold, up to which is compared; None without one
 
 
 def held(measured: Run, predicted: Run) -> Held:
-    """Compare a recording with a prediction.
+    """Compare a recording, up to its first hold, with a prediction.
 
     Raises:
         InputError: `predicted` is no prediction, or it has no tick and signal in common with `measured`.
@@ -77,6 +79,7 @@ def held(measured: Run, predicted: Run) -> Held:
         raise InputError(
             f"{measured.path} is itself a prediction: give the recording of the test that was run."
         )
+    measured, stood = before_hold(measured)
     found: dict[str, HeldSignal] = {}
     ticks = 0
     for topic in (MASTER, *measured.roles):
@@ -89,7 +92,7 @@ def held(measured: Run, predicted: Run) -> Held:
         raise InputError(f"{measured.path} and {predicted.path} have no tick and signal in common.")
     inside = float(np.mean([one.inside for one in found.values()]))
     fine = inside >= ENOUGH and all(one.inside >= LEAST for one in found.values())
-    return Held(ticks, found, inside, fine, figures, same_plan(measured, predicted))
+    return Held(ticks, found, inside, fine, figures, same_plan(measured, predicted), stood)
 
 
 def of_topic(measured: Run, predicted: Run, topic: str) -> tuple[int, dict[str, HeldSignal]]:

@@ -16,7 +16,7 @@ from common.plan.plan import Plan
 from common.plan.read import from_tables
 from common.protocol.messages import Answer, Extend, Message, Operator
 from common.reality import reality
-from common.recording.holds import Hold, holds, places
+from common.recording.holds import Hold, before_hold, holds, places
 from common.recording.reader import read
 from common.recording.run import Run
 from common.safety.modes import Mode
@@ -25,7 +25,7 @@ from diagnosis.recorded import record as recorded
 from report.facts.due import due
 from report.facts.summary import summarize
 from rths.examine.replay import planned, replay_master, replay_slaves
-from simulation import virtual
+from simulation import source, virtual
 from simulation.virtual import VirtualTest
 from tests.helpers import without_recorder
 
@@ -158,6 +158,15 @@ def test_the_diagnosis_judges_what_lies_before_the_hold(held: Run) -> None:
     assert built.ticks == BEGUN
     assert built.held == BEGUN * built.plan.test.interval
     assert built.signals["displacement"].shape[0] == BEGUN
+
+
+def test_a_comparison_goes_up_to_the_hold_and_says_so(held: Run, through: Run) -> None:
+    found = source.recorded(held)
+    assert found.ticks.tolist() == list(range(BEGUN))
+    assert found.motion.endswith("; held at 0.600 s, and compared up to there")
+    cut, stood = before_hold(through)
+    assert cut is through
+    assert stood is None
 
 
 def test_several_slaves_and_several_holds(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from common.roles import MASTER
 from common.terminal import cli
 from loop import substructure
 from loop.of_reality import really, rolled_out
-from report.prediction import said
+from report.prediction import overlay, said
 from rths.__main__ import main
 from rths.prepare.simulate import write as record
 from simulation.prediction import bands, draws, file, held, rest, shape
@@ -133,22 +133,24 @@ def test_the_rms_of_a_drawn_error_is_its_share_of_the_envelope() -> None:
     assert np.std(drawn, axis=0)[500:1500] == pytest.approx(np.full(1000, 0.1), rel=0.15)
 
 
+def measured(path: Path, found: Prediction, **more: Any) -> Path:
+    """A test of the laboratories as found, or with other tables of their reality, as a recording at `path`."""
+    plan = short(scale=0.2)
+    truth = from_reality(tables(plan, seed=5, **more), plan, path.parent)
+    ground = substructure.ground_rows(plan, found.motion)
+    record(path, plan, really(truth, noise=True), found.motion, ground)
+    return path
+
+
 def test_a_test_can_be_compared_with_a_predictions_recording(
     folder: Path, found: Prediction, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path, plan = folder / "next.mcap", short(scale=0.2)
+    path = folder / "next.mcap"
     file.write(path, found, "found.toml")
     run = read(path)
     np.testing.assert_array_equal(run.columns[MASTER]["column_force"], found.middle.master["column_force"])
     for name, more in (("as_found", {}), ("other", {"column": {"stiffness": 1.0e7}})):
-        truth = from_reality(tables(plan, seed=5, **more), plan, folder)
-        record(
-            folder / f"{name}.mcap",
-            plan,
-            really(truth, noise=True),
-            found.motion,
-            substructure.ground_rows(plan, found.motion),
-        )
+        measured(folder / f"{name}.mcap", found, **more)
     same = held.held(read(folder / "as_found.mcap"), run)
     assert same.held
     assert "The prediction held" in said.sentences(same)[0]
@@ -224,6 +226,51 @@ def held_code(folder: Path, name: str) -> int:
 
     sys.argv = ["rths", "compare", str(folder / f"{name}.mcap"), "--predicted", str(folder / "next.mcap")]
     return main()
+
+
+def test_a_test_and_its_prediction_stand_over_each_other_on_a_page_and_beside_each_other_in_a_file(
+    folder: Path, found: Prediction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    test, next_ = folder / "over.mcap", folder / "over_next.mcap"
+    measured(test, found)
+    file.write(next_, found, "found.toml")
+    page, both = tmp_path / "over.html", tmp_path / "both.mcap"
+    words = ["compare", str(test), "--predicted", str(next_), "--html", str(page), "-o", str(both)]
+    monkeypatch.setattr("sys.argv", ["rths", *words])
+    assert main() == 0
+    text = page.read_text(encoding="utf-8")
+    assert "The prediction held" in text
+    assert text.count("data:image/png;base64,") == 2
+    runs = {"": read(test), "predicted.": read(next_), "lower.": read(next_), "upper.": read(next_)}
+    result = read(both)
+    for prefix, run in runs.items():
+        for topic in (MASTER, "slave"):
+            source = topic if prefix in ("", "predicted.") else f"{prefix}{topic}"
+            np.testing.assert_array_equal(result.log_ns[prefix + topic], runs[""].log_ns[topic])
+            for name, values in run.columns[source].items():
+                np.testing.assert_array_equal(result.columns[prefix + topic][name], values)
+    assert main() == 2  # the files are there
+
+
+def test_what_was_measured_is_drawn_from_the_recording_and_not_from_the_prediction(
+    folder: Path, found: Prediction
+) -> None:
+    test, next_ = folder / "drawn.mcap", folder / "drawn_next.mcap"
+    measured(test, found)
+    file.write(next_, found, "found.toml")
+    shown = overlay.overlays(read(test), read(next_))
+    assert [one.label for one in shown] == [
+        "floor",
+        "column displacement",
+        "column force",
+        "table acceleration",
+        "damper force",
+        "table displacement",
+    ]
+    force = shown[2]
+    np.testing.assert_array_equal(force.measured, read(test).columns[MASTER]["column_force"])
+    np.testing.assert_array_equal(force.middle, found.middle.master["column_force"])
+    assert (force.low <= force.high).all()
 
 
 def test_with_lost_messages_the_predicted_line_is_not_a_single_draw_of_losses(tmp_path: Path) -> None:
