@@ -51,4 +51,4 @@ class Snapshot(NamedTuple):
     shown: Shown | None = None
     plan: Looked = Looked()
     machine: Looked = Looked()
-    last: tuple[str, ...] = ()  # the last words of the newest test that this panel started, once it has ended
+    last: tuple[tuple[str, str], ...] = ()  # who ended the newest test that this panel started, and why

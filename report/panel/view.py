@@ -46,7 +46,7 @@ class View:
             "test": test(shown, feed) if shown else None,
             "phase": phase(snapshot, labs, feed),
             "labs": labs,
-            "causes": causes(shown, feed),
+            "causes": causes(snapshot, feed),
             "bars": list(bars(feed)),
             "plan": self._plan(snapshot),
             "machine": self._machine(snapshot.machine),
@@ -76,6 +76,7 @@ class View:
             if role not in told.alive and told.alive_at > at:
                 in_order = mode == Mode.IDLE.value  # as after every end in which its rig came to rest
                 mode, note = LEFT if in_order else GONE, f"it was {mode.replace('_', ' ')}"
+                age = self._seconds(told.alive_at)
         elif shown.own:
             mode, age = "starting", self._seconds(told.alive_at) if role in told.alive else None
         if mode in {one.value for one in LATCHED}:
@@ -161,12 +162,12 @@ def phase(snapshot: Snapshot, labs: list[dict[str, Any]], feed: Feed) -> str:
     return next((word for word in words if word in modes), "starting")
 
 
-def causes(shown: Shown | None, feed: Feed) -> list[dict[str, str]]:
+def causes(snapshot: Snapshot, feed: Feed) -> list[dict[str, str]]:
     """What stopped the test: laboratory, test time and sentence of each cause."""
     found = [
         {"lab": title(one.lab), "t": f"t = {one.t:.2f} s", "text": one.text} for one in feed.standing.stops
     ]
-    told = shown.told.causes if shown else ()
+    told = snapshot.shown.told.causes if snapshot.shown else snapshot.last
     return (found or [{"lab": title(lab), "t": "", "text": text} for lab, text in told])[:CAUSES]
 
 

@@ -104,7 +104,7 @@ class Hands:
         self._arming: Job | None = None
         self._checks: dict[str, tuple[Check, Job]] = {}
         self._looked = {CHECK: Looked(), MACHINE: Looked()}
-        self._last: tuple[str, ...] = ()
+        self._last: tuple[tuple[str, str], ...] = ()
         self._shown: Shown | None = None
         self._sought = 0.0
         self._closing = threading.Event()
@@ -264,7 +264,8 @@ class Hands:
             )
         if command.over:
             told = command.told
-            self._last = tuple(f"{title(lab)}: {text}" for lab, text in told.causes) or told.said[-1:]
+            ended = told.said[-1:] if command.code else ()
+            self._last = told.causes or tuple(("the test's command", text) for text in ended)
             self._command = None
             if arming is not None and self._arming is not None:
                 self._arming = None

@@ -46,6 +46,10 @@ UNRUN = {
     "docs/how-to/opensees-server.md": [
         "rths serve two_columns --opensees 127.0.0.1:8090 --opensees 127.0.0.1:8091 --intervals 2"
     ],
+    "docs/how-to/panel.md": [
+        "rths panel default --host lab-a.example.net --port 5006",
+        "ssh -L 5006:127.0.0.1:5006 lab-a.example.net",
+    ],
     "docs/how-to/security.md": [
         "ssh b mkdir -m 700 test/keys",
         "scp keys/authority.pem keys/slave.pem keys/slave.key b:test/keys/",

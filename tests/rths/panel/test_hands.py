@@ -154,7 +154,7 @@ def test_arming_starts_a_run_command_and_reports_when_all_laboratories_are_armed
         desk.give("stop").state == "done"
     )  # its laboratories are not linked, so that the command is interrupted
     until(lambda: desk.hands.snapshot.shown is None)
-    assert desk.hands.snapshot.last == ("Stopped by SIGINT.",)
+    assert desk.hands.snapshot.last == (("the test's command", "Stopped by SIGINT."),)
 
 
 def test_a_command_that_ends_before_all_are_armed_gives_its_reason(
@@ -162,7 +162,7 @@ def test_a_command_that_ends_before_all_are_armed_gives_its_reason(
 ) -> None:
     program(RUN.replace("ENDING", REFUSED))
     assert desk.give("arm", desk.plan.digest()) == Outcome("refused", "The door is open.")
-    assert desk.hands.snapshot.last == ("slave: The door is open.",)
+    assert desk.hands.snapshot.last == (("slave", "The door is open."),)
 
 
 def test_a_plan_that_has_changed_or_is_missing_is_not_armed(
