@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from common.lab.operation import EMERGENCY, RESET, START, STOP
+from common.lab.operation import EMERGENCY, HOLD, RESET, RESUME, START, STOP
 
 CHECK, MACHINE, ARM = "check", "machine", "arm"  # which this machine carries out, not the laboratories
 
@@ -35,6 +35,8 @@ WORDS: Mapping[str, Word] = {
             planned=True,
         ),
         Word(START, "Start", "begins the armed test", moves=True, planned=True),
+        Word(HOLD, "Hold", "lets the earthquake's time slow down and stand still"),
+        Word(RESUME, "Resume", "lets the earthquake's time of a held test go on", moves=True),
         Word(STOP, "Stop", "brings all rigs to rest in order and ends the test"),
         Word(EMERGENCY, "Emergency stop", "disarms all rigs at once, without a ramp"),
         Word(RESET, "Reset", "lets latched laboratories go once the cause is gone", moves=True),

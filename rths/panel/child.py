@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
+from common.safety.modes import Mode
 from report.panel.snapshot import Looked, Told
 from rths.perform.processes import ROOT
 
@@ -41,6 +42,7 @@ class RunCommand:
 
     def __init__(self, words: Sequence[str]) -> None:
         self.ready = False  # whether armed rigs wait for the start
+        self.moved = False  # whether a laboratory has run
         self._modes: dict[str, tuple[str, int]] = {}
         self._alive: tuple[tuple[str, ...], int] = ((), 0)
         self._causes: list[tuple[str, str]] = []
@@ -63,6 +65,7 @@ class RunCommand:
         match data:
             case {"kind": "mode", "lab": str(lab), "mode": str(mode)}:
                 self._modes = {**self._modes, lab: (mode, now)}
+                self.moved = self.moved or mode == Mode.RUNNING.value
             case {"kind": "alive", "processes": list(names)}:
                 self._alive = tuple(map(str, names)), now
             case {"kind": "event", "level": "error", "lab": str(lab), "text": str(text)}:

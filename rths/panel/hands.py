@@ -23,7 +23,6 @@ from common.link.endpoint import Endpoint
 from common.plan.plan import Plan
 from common.plan.read import parse
 from common.roles import title
-from common.safety.modes import Mode
 from report.panel.desk import DONE, REFUSED, UNHEARD, Outcome, Present
 from report.panel.snapshot import Looked, Shown, Snapshot
 from report.panel.words import ARM, CHECK, MACHINE
@@ -33,7 +32,6 @@ from rths.perform.operate import PATIENCE_S, Given, Outstanding, line
 TURN_S = 0.01  # s between two turns: an order waits no longer for its turn
 LOOK_S = 0.3  # s between two looks for tests on this machine
 STOPS = (STOP, EMERGENCY)
-STILL = frozenset({Mode.IDLE.value, Mode.CONFIGURED.value, Mode.ARMED.value})  # in which nothing has moved
 BUSY = "A test runs, which a check would disturb."
 OVER = Outcome(UNHEARD, "This part of the panel has ended: start `rths panel` again.")
 
@@ -143,7 +141,7 @@ class Hands:
         self._opener.shutdown()
         if self._command is None or self._command.over:
             return ""
-        if {mode for mode, _ in self._command.told.modes.values()} <= STILL:
+        if not self._command.moved:
             self._command.interrupt()
             return "The armed test was not started, and is asked to end."
         return "The test goes on as planned: `rths stop` ends it, and `rths panel` finds it again."

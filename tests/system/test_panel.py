@@ -11,8 +11,10 @@ import pytest
 
 from common.plan.plan import Plan
 from common.plan.read import with_test
+from common.recording.reader import read
 from report.panel.words import WORDS
-from tests.browser import chromium, open_page
+from tests.browser import Page, chromium, open_page
+from tests.helpers import PATIENT
 from tests.processes import HANG_S, environment
 from tests.rths.panel.stand_in import StandIn
 
@@ -35,6 +37,9 @@ WATCH = """() => { window.outcomes = {}; const fetched = window.fetch;
     }
     return answer; }; }"""
 ORDERS = "[...document.querySelectorAll('#orders li')].map((one) => one.textContent.replace(/^[0-9:]+ /, ''))"
+
+
+ENABLED = "document.querySelector('button[data-word=%s]').getAttribute('aria-disabled') === 'false'"
 
 
 class Panels:
@@ -72,6 +77,11 @@ def panels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Panels]:
     for process in found.running:
         process.kill()
         process.communicate()
+
+
+def press(page: Page, word: str) -> None:
+    """Press a button with the mouse."""
+    page._page.click(f"button[data-word={word}]")
 
 
 def test_a_thousand_stops_reach_the_laboratories_and_none_is_lost(panels: Panels, short_plan: Plan) -> None:
@@ -163,3 +173,35 @@ def test_two_browsers_see_each_others_orders_and_a_page_of_an_ended_panel_gives_
         assert request.post(f"{page._page.url}order", data=replayed).status == 403  # it comes from no page
         assert len(labs.presses["master"]) == 1
     panels.end()
+
+
+def test_a_whole_test_is_operated_from_the_page_and_outlives_its_panel(panels: Panels) -> None:
+    (panels.folder / "plan.toml").write_text(f"[test]\nname = 'operated'\nduration = 300.0\n{PATIENT}")
+    with open_page(panels.start("plan.toml")) as page:
+        press(page, "check")
+        page.wait(ENABLED % "arm", HANG_S)
+        press(page, "arm")
+        page.wait(ENABLED % "start", HANG_S)
+        press(page, "start")
+        page.wait("document.getElementById('phase').textContent === 'running'", HANG_S)
+        page.wait("document.querySelectorAll('#bars [role=meter]').length > 10", HANG_S)
+        panels.running[0].kill()
+        panels.running[0].communicate()
+        panels.running = []
+    with open_page(panels.start("plan.toml")) as page:
+        page.wait(LINKED, HANG_S)
+        page.wait("document.getElementById('test').textContent.includes('started elsewhere')", HANG_S)
+        press(page, "stop")
+        page.wait(
+            "document.getElementById('phase').textContent.startsWith('No test runs. The last one ended')",
+            HANG_S,
+        )
+        assert "stopped by the operator" in page.evaluate("document.getElementById('phase').textContent")
+    panels.end()
+    recordings = list((panels.folder / "runs").glob("operated-*.mcap"))
+    assert len(recordings) == 1
+    run = read(recordings[0])
+    assert run.finished
+    said = [event["text"] for event in run.events if event["code"] == "operator" and event["lab"] == "master"]
+    assert said[0] == "start: The test begins."
+    assert said[1].startswith("stop: ")

@@ -158,6 +158,17 @@ def test_the_largest_value_of_the_last_second_follows_a_decaying_motion(watched:
     assert stroke.lately < stroke.most
 
 
+def test_a_held_test_is_said_to_be_held_until_it_goes_on(watched: Watched) -> None:
+    watched.tell(master="running", slave="running")
+    event = {"lab": "master", "t": 1.0, "level": "info", "text": "", "values": {}}
+    for code, said in (("hold", "slowing down to a hold"), ("held", "held"), ("resumed", "running")):
+        watched.feed.standing.event(event | {"code": code})
+        assert watched.state()["phase"] == said
+    watched.feed.standing.event(event | {"code": "held"})
+    watched.tell(master="ramping", slave="ramping")
+    assert watched.state()["phase"] == "ramping"
+
+
 def test_causes_and_latched_laboratories_are_shown(tmp_path: Path, short_plan: Plan) -> None:
     plan = with_table(short_plan, "limits", column_force=12e3)
     made = tmp_path / "made.mcap"
