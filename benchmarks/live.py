@@ -1,4 +1,4 @@
-"""The cost of a live view: late ticks of whole tests with and without it, in turns, and its processor time.
+"""The cost of a live view and of a panel: late ticks of whole tests with and without, in turns, and processor time.
 
 In the tests with a browser the page is open in a headless Chromium on the same machine, which renders in software: that
 costs more than a browser on another machine. The plan tolerates late ticks, so that they are counted but end no test.
@@ -15,6 +15,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,11 +29,12 @@ from tests.browser import chromium, open_page
 from tests.helpers import patient
 
 SECONDS, QUICK_S = 20.0, 2.0  # duration of a test
-REPEATS = 5  # odd, so that the median is a measured value; fifteen tests take about seven minutes
+REPEATS = 5  # odd, so that the median is a measured value; twenty tests take about nine minutes
 MOST = 0.05  # percentage points of late ticks: 5 of the 10,000 ticks of a test
 WITHOUT, VIEW, BROWSER = "without", "--live", "--live and a browser"
+PANEL = "rths panel and a browser"
 KNOWN = ("master.priority", "bare_loop.ticks", "bare_loop.late")
-URL = re.compile(r"live view: (http://\S+)")
+URL = re.compile(r"(?:live view|panel): (http://\S+)")
 TIME = re.compile(r"t +([\d.]+)/")
 
 
@@ -58,7 +60,7 @@ class Turn(NamedTuple):
 def run(*, quick: bool = False) -> list[BenchmarkFigure]:
     """Run all kinds of tests in turns, in a new random order each time."""
     seconds, repeats = (QUICK_S, 1) if quick else (SECONDS, REPEATS)
-    kinds = [WITHOUT, VIEW, *([BROWSER] if chromium() and not quick else [])]
+    kinds = [WITHOUT, VIEW, *([BROWSER, PANEL] if chromium() and not quick else [])]
     order, draw = [], random.Random(1)  # noqa: S311 - no secret
     for _ in range(repeats):
         order += draw.sample(kinds, len(kinds))
@@ -74,10 +76,13 @@ def played(kind: str, seconds: float) -> Turn:
     with tempfile.TemporaryDirectory() as folder:
         path, said = Path(folder) / "a.mcap", Path(folder) / "said"
         words = [str(patient(Path(folder))), "--duration", str(seconds)]
-        words += ["--live"] if kind != WITHOUT else []
-        with subprocess.Popen(
-            command(path, *words), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-        ) as process:
+        words += ["--live"] if kind in (VIEW, BROWSER) else []
+        with (
+            operated() if kind == PANEL else contextlib.nullcontext(),
+            subprocess.Popen(
+                command(path, *words), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+            ) as process,
+        ):
             try:
                 share = watched(process, path, said, browser=kind == BROWSER)
             except PageError as error:  # the test was over before the page had loaded
@@ -85,6 +90,22 @@ def played(kind: str, seconds: float) -> Turn:
                 return Turn(Ending(process.returncode, str(error).splitlines()[0], None), None)
         ended = ending(process.returncode, said.read_text(), path)
     return Turn(ended, facts(ended.run, share) if ended.completed and ended.run is not None else None)
+
+
+@contextlib.contextmanager
+def operated() -> Iterator[None]:
+    """A panel that is open in a browser; it finds the test that runs on this machine."""
+    words = [sys.executable, "-m", "rths", PANEL.split()[1], "--no-browser"]
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None  # noqa: S101 - it is a pipe
+        try:
+            found = URL.match(process.stdout.readline())
+            if found is None:
+                raise PageError("The panel has not said where it is.")
+            with open_page(found[1]):
+                yield
+        finally:
+            process.terminate()
 
 
 def facts(recording: Run, share: float) -> Test:
@@ -120,11 +141,12 @@ def watched(process: subprocess.Popen[str], path: Path, said: Path, *, browser: 
 
 
 def seconds_of(path: Path) -> float:
-    """Processor time that the view of a recording has used so far, s; 0 without a view."""
+    """Processor time that the view of a recording, or a panel, has used so far, s; 0 without one."""
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             words = (folder / "cmdline").read_bytes().split(b"\0")
-            if b"rths.perform.live" in words and os.fsencode(path) in words:
+            view = b"rths.perform.live" in words and os.fsencode(path) in words
+            if view or words[1:4] == [b"-m", b"rths", b"panel"]:
                 fields = (folder / "stat").read_text().rpartition(")")[2].split()
                 return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
     return 0.0

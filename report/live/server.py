@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import errno
 import logging
-import os
 import time
 from collections.abc import Callable
 from functools import partial
@@ -58,9 +57,11 @@ class Server:
         try:
             sockets, self._port = bind_sockets(host, port)
         except OSError as error:
-            reason = "it is in use" if error.errno == errno.EADDRINUSE else os.strerror(error.errno or 0)
+            reason = "it is in use" if error.errno == errno.EADDRINUSE else error.strerror
+            where, other = ("", "port") if host == LOOPBACK else (f" under {host}", "--host or --port")
             raise InputError(
-                f"Cannot serve the live view on port {port}: {reason}; give another port."
+                f"Cannot serve the {'panel' if panel else 'live view'}{where} on port {port}: {reason}; "
+                f"give another {other}."
             ) from None
         self._panel = panel(self._port) if panel else None
         self._guard = self._panel.guard if self._panel else Guard(host, self._port)

@@ -29,7 +29,8 @@ from report.panel.words import ARM, CHECK, MACHINE
 from rths.panel.child import Check, RunCommand
 from rths.perform.operate import PATIENCE_S, Given, Outstanding, line
 
-TURN_S = 0.01  # s between two turns: an order waits no longer for its turn
+TURN_S = 0.01  # s between two turns while answers are awaited
+IDLE_S = 0.05  # s between two turns while none is; a new order ends the wait at once
 LOOK_S = 0.3  # s between two looks for tests on this machine
 STOPS = (STOP, EMERGENCY)
 BUSY = "A test runs, which a check would disturb."
@@ -62,6 +63,7 @@ class Reached:
     def __init__(self, process: int, entry: Running, opener: ThreadPoolExecutor) -> None:
         self.entry = entry
         self.plan = parse(entry.plan, Path(entry.folder))
+        self.digest = self.plan.digest()
         self.test = named(entry.test, process)
         self.orders: Outstanding | None = None
         self._endpoint: Endpoint | None = None
@@ -99,6 +101,7 @@ class Hands:
         self._reached: Reached | None = None
         self._command: RunCommand | None = None
         self._armed: Plan | None = None  # the plan with which the command was started
+        self._digest = ""  # of that plan
         self._arming: Job | None = None
         self._checks: dict[str, tuple[Check, Job]] = {}
         self._looked = {CHECK: Looked(), MACHINE: Looked()}
@@ -171,7 +174,7 @@ class Hands:
 
     def _turn(self) -> None:
         with contextlib.suppress(Empty):
-            self._begin(self._queue.get(block=not self._linked, timeout=TURN_S))
+            self._begin(self._queue.get(block=not self._given, timeout=IDLE_S))
             while True:
                 self._begin(self._queue.get_nowait())
         self._follow_command()
@@ -247,7 +250,8 @@ class Hands:
             self._armed = self._options.load()
         except RthsError as error:
             return str(error)
-        if self._armed.digest() != job.digest:
+        self._digest = self._armed.digest()
+        if self._digest != job.digest:
             return "The plan has changed since it was checked: check it again."
         return ""
 
@@ -287,7 +291,7 @@ class Hands:
 
     def _same_plan(self, reached: Reached) -> None:
         """End a test of the panel's own whose plan is not the one that was checked and shown."""
-        if self._command is None or self._armed is None or reached.plan.digest() == self._armed.digest():
+        if self._command is None or self._armed is None or reached.digest == self._digest:
             return
         self._command.interrupt()
         if self._arming is not None:
@@ -308,7 +312,7 @@ class Hands:
                 self._waiting.remove(job)
                 job.settled.set_result(Outcome(UNHEARD, "There is no link to the laboratories."))
         if orders is not None:
-            for given in orders.look(TURN_S):
+            for given in orders.look(TURN_S if self._given else 0.0):
                 self._given.pop(given.wish.press).settled.set_result(outcome(given))
         elif self._given:
             for job in self._given.values():
@@ -324,7 +328,7 @@ class Hands:
             entry, plan = reached.entry, reached.plan
             own = command is not None and named(entry.test, command.process) == reached.test
             shown = Shown(
-                reached.test, entry.test, plan, plan.digest(), None, own, reached.orders is not None
+                reached.test, entry.test, plan, reached.digest, None, own, reached.orders is not None
             )
             shown = shown._replace(recording=Path(entry.recording) if entry.recording else None)
             return shown._replace(told=command.told) if own and command is not None else shown
@@ -332,7 +336,7 @@ class Hands:
             return None
         name = self._armed.test.name
         test = named(name, command.process)
-        return Shown(test, name, self._armed, self._armed.digest(), None, True, False, command.told)
+        return Shown(test, name, self._armed, self._digest, None, True, False, command.told)
 
 
 def closed(opening: Future[Endpoint]) -> None:
