@@ -1,4 +1,4 @@
-"""The earthquake's time of a test that an operator may hold: where it stands at every tick, and how fast it passes.
+"""The earthquake's time of a test that an operator may hold: its value at every tick, and its rate.
 
 It is counted in control intervals from the start of the motion, and at full rate passes one of them per tick. A hold
 slows it down to standstill over a ramp of `ramp` ticks and a resumption speeds it up over as many, along the curve

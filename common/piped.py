@@ -52,7 +52,7 @@ class PipedProgram:
             raise EndedError(self.last_words()) from None
 
     def answer(self, size: int, seconds: float | None = None) -> bytes | None:
-        """Its next `size` bytes; None where they have not come after so many seconds; raises EndedError."""
+        """Its next `size` bytes, or None after that many seconds without them; raises EndedError where it has ended."""
         assert self._process.stdout is not None  # noqa: S101 - it is a pipe
         while len(self._read) < size:
             try:

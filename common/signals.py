@@ -224,7 +224,7 @@ SENT_ = "sent_"  # prefix of a sent signal where the master's own laboratory has
 def topics(laboratories: Mapping[str, Channels], *, served: bool = False) -> dict[str, tuple[Signal, ...]]:
     """The topics of a recording with their signals; `laboratories` holds the channels of each role with a laboratory.
 
-    The slaves stand in the plan's order. A master without a laboratory of its own is not among the roles. Where the
+    The slaves are in the plan's order. A master without a laboratory of its own is not among the roles. Where the
     laboratories are `served` to a client, the building is the client's.
 
     Raises:

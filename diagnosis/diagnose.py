@@ -50,7 +50,7 @@ def diagnose(
     require: float | None = None,
     more: Mapping[str, Sequence[Record]] = MappingProxyType({}),
 ) -> dict[str, report.Judged]:
-    """The reports on a test by role of the slave, without their verdicts in words, each with what was found.
+    """The reports on a test by role of the slave, without their verdicts in words, each with its findings.
 
     Each report covers the master and one slave; its closed loop holds the other slaves as they were diagnosed. A test
     without slaves has one report, under the master's role. `require` is the gap that may be left in each part. Effects

@@ -1,4 +1,4 @@
-"""Runs the commands of a page: `python -m docs.console docs/tutorial.md` says where its text differs from their output.
+"""Runs the commands of a page: `python -m docs.console docs/tutorial.md` lists where its text and their output differ.
 
 A fenced block of the language `console` holds commands after `$ ` (continued after `> `) and what they print. `…` in
 a line stands for anything within it, a line `…` for any lines. Its commands share one shell; one that fails is

@@ -14,7 +14,7 @@ def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def quantity(value: object) -> str:
-    """A value as a plan has it."""
+    """A value as written in a plan."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, tuple):

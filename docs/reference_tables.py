@@ -1,4 +1,4 @@
-"""The reference as the code's own tables have it: keys of a plan, commands, effects, methods, exit codes."""
+"""The reference pages from the code's own tables: keys of a plan, commands, effects, methods, exit codes."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def blank(cls: type[Any]) -> Any:
 
 
 def key_row(field: dataclasses.Field[Any], default: Any) -> tuple[str, ...]:
-    """One key; those that a model takes beside its name stand in one row."""
+    """One key; those that a model takes beside its name share one row."""
     rule: Rule = field.metadata["rule"]
     if field.metadata["more"]:
         given = ", ".join(f"`{name} = {value:g}`" for name, value in default.items())
@@ -116,7 +116,7 @@ def command(verb: str) -> str:
 
 
 def usage(action: argparse.Action) -> str:
-    """A positional argument as it stands in the usage."""
+    """A positional argument as the usage shows it."""
     name = str(action.metavar or action.dest)
     return f"[{name}]" if action.nargs == "?" else name
 
@@ -131,7 +131,7 @@ def spelled(action: argparse.Action) -> str:
 
 
 def default(action: argparse.Action) -> str:
-    """The value where it is not given, as far as there is one to name."""
+    """The default value as a text, where there is one."""
     plain = action.default is None or isinstance(action.default, bool) or action.default in ("", [])
     return "" if plain or action.default is argparse.SUPPRESS else f"`{action.default}`"
 
@@ -282,7 +282,7 @@ def exits() -> str:
 
 
 def budget() -> str:
-    """The latency budget that ships, as it is."""
+    """The text of the shipped latency budget."""
     from report.budget.limits import DEFAULT
 
     return f"```toml\n{DEFAULT.read_text(encoding='utf-8')}```\n"

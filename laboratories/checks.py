@@ -23,7 +23,7 @@ FINE = -1  # returned by `look` where all values are within their limits
 # Consecutive intervals for which an error must be beyond its limit to count: one or two late messages cause an error of
 # one or two intervals.
 PATIENCE = 3
-# A sensor is judged when the command has moved by so many times its nominal noise (rms): two readings then differ by
+# A sensor is judged when the command has moved by this many times its nominal noise (rms): two readings then differ by
 # ten standard deviations.
 TRAVEL = 10.0
 

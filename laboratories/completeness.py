@@ -32,7 +32,7 @@ KERNEL = types.void(VECTOR, VECTOR, VECTOR, types.float64, types.float64)
 WORD = re.compile(r"[a-z][a-z0-9_]*")
 # names of other signals in the topics that record a laboratory's channels
 TAKEN = frozenset(signal.name for signal in (*BUILDING, NUMERICAL, MODE)) | {"command_seq"}
-BESIDE = 64  # guard numbers on each side of an array: a wrong index is noticed up to so many places beyond it
+BESIDE = 64  # guard numbers on each side of an array: a wrong index is found up to this many places beyond it
 # the trial: one period of a sine of 1 mm
 INTERVAL = 2e-3  # s, the default control interval
 TICKS = 250  # one period of 0.5 s, that of the default building

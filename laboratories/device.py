@@ -67,7 +67,7 @@ class Fault(NamedTuple):
     The fault `leak` is the effect `device.leak`, which a reality can hide and a diagnosis can name.
     """
 
-    says: str  # its description in a few words
+    says: str  # its short description
     parameter: str  # name of its magnitude
     unit: str
     null: float  # the magnitude without the fault

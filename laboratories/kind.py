@@ -140,7 +140,7 @@ class Kind(ABC):
     """One kind of laboratory. A kind of a user's is a subclass of `laboratories.device.Device` in a file of its own."""
 
     name: str
-    says: str  # the devices in the laboratory, in a few words
+    says: str  # a short text on the devices in the laboratory
     channels: Channels
     limited: Limited = Limited()
     sensed: tuple[Sensed, ...] = ()
@@ -148,7 +148,7 @@ class Kind(ABC):
     pictured: Pictured
     reaches: ClassVar[Mapping[tuple[str, str], float]] = {}  # peaks on the default test, by channel and unit
     responses: tuple[str, ...] = ()  # channels by which a test's gap is judged; none: `position` and `force`
-    free: str = ""  # channel of a motion without restoring force, which a replay therefore begins anew
+    free: str = ""  # channel of a motion without restoring force, which a replay therefore restarts
     record: type[Any]  # NamedTuple of the laboratory's state and constants
     advance: Callable[..., None]  # (record, truth, command, effort): one interval, see `kinds.advance`
 
@@ -215,7 +215,7 @@ class Kind(ABC):
         """The compensator that the plan chooses for it."""
 
     def noise(self, plan: Plan) -> Array:
-        """Nominal rms noise of its measured channels, (channels,), each in its signal's unit, as `[sensors]` has it."""
+        """Nominal rms noise of its measured channels, (channels,), each in its signal's unit, from `[sensors]`."""
         return np.array([getattr(plan.sensors, name) for name in self.channels.names])
 
     def limits(self, plan: Plan) -> Mapping[str, float]:

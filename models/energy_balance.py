@@ -72,7 +72,7 @@ def enter(
 def step(
     balance: EnergyBalance, ground_acceleration: float, target: float, measured: float, force: float
 ) -> bool:
-    """Update the balance by one tick, whose motion of the building stands in `motion`.
+    """Update the balance by one tick; `motion` holds the building's motion.
 
     `ground_acceleration` (m/s²), the specimen's `target` and `measured` deformation (m) and its `force` (N) are those
     of the tick. The shares are written into `sums`; returns whether both are within their limits.

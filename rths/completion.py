@@ -99,7 +99,7 @@ def with_plans(name: str, *patterns: str) -> Mapping[str, Any]:
     """Completer of files with some patterns and of the plans that ship; `name` goes into the shells' functions."""
     found = files(*patterns)
     plans = " ".join(cli.SHIPPED)
-    own = f"_rths_glob_{name}"  # by _glob_ shtab's bash script knows that these are files
+    own = f"_rths_glob_{name}"  # _glob_ tells shtab's bash script that these are files
     groups = f"'plans:plan that ships:({plans})' 'files:file:_files -g \"{either(patterns)}\"'"
     preamble = {
         "bash": f"{found['preamble']['bash']}\n"

@@ -136,7 +136,7 @@ def play(
 
 
 def _unattended(loop: MasterLoop | SlaveLoop, stopping: Callable[[], str]) -> Callable[[], str]:
-    """The reason to stop of a laboratory without an operator: a latched one stops, because nobody would reset it.
+    """The reason to stop of a laboratory without an operator: a latched one stops, because nobody can reset it.
 
     During the handshake `stopping` is not asked: it takes no time, and afterwards all laboratories hear of the end.
     """

@@ -1,4 +1,4 @@
-"""What an element of OpenSees does with its socket, in plain Python: `python client.py PORT STEPS` makes so many steps.
+"""The socket protocol of an OpenSees element in plain Python: `python client.py PORT STEPS` makes this many steps.
 
 A step is that of NewmarkExplicit (docs/decisions/0043-outer-building.md). It runs as a script, without this project.
 """

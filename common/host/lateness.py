@@ -1,4 +1,4 @@
-"""Detects when so many ticks come late that a test cannot be called real-time."""
+"""Detects when too many ticks are late for a test in real time."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def announced_already() -> bool:
 
 
 def only(name: str | None = None) -> Running:
-    """The one test that runs here, or the one of that name.
+    """The only test that runs here, or the one with the given name.
 
     Raises:
         InputError: there is none, or more than one.

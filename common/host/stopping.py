@@ -40,7 +40,7 @@ class Stopper:
         self.presses += 1
         self._reason = self._reason or f"stopped by the user ({signal.Signals(number).name})."
         if self.presses > 1 and self.answer is not None:
-            with contextlib.suppress(Exception):  # nothing that is said here may reach the loop as an error
+            with contextlib.suppress(Exception):  # no failure of this message may reach the loop as an error
                 os.write(STDERR, f"{self.answer()}\n".encode())
 
     def __call__(self) -> str:

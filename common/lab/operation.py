@@ -22,7 +22,7 @@ class Order(NamedTuple):
     """A request that an operator may make of a test."""
 
     word: str  # in messages and in the recording
-    says: str  # what it does, in a few words that continue "rths ..."
+    says: str  # what it does, as a short text that continues "rths ..."
     everywhere: bool = True  # whether every laboratory does and answers it, or the master alone
 
     def answered_by(self, slaves: Sequence[str]) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ PIECE = 16  # items: at 500 ticks per second a piece leaves every 16 to 32 ms, s
 AT_ONCE = (
     "event"  # the topic whose items are sent at once: a stopped laboratory adds no more items to fill a piece
 )
-# Items of so many times the recorder's patience are kept for sending again, at the default of 10 s those of a minute:
+# Items of this many times the recorder's patience are kept for sending again, at the default of 10 s those of a minute:
 # enough for a recorder that was silent for nearly its whole patience and then asks for its holes five pieces at a time.
 PATIENCES = 6
 KEPT_BYTES = (

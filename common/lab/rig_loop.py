@@ -118,7 +118,7 @@ class RigLoop:
         return False, "The master starts the test."
 
     def end(self, reason: str) -> None:
-        """Bring the test to an end in order: after its last tick, or earlier because somebody wants it so."""
+        """Bring the test to an end in order: after its last tick, or earlier on request."""
         lab = self.lab
         if lab.exchange.allows(Event.STOP):
             lab.exchange.happen(Event.STOP, cause=reason)

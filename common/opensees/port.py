@@ -66,7 +66,7 @@ def check_free(text: str) -> None:
 
 
 def unusable(host: str, port: int, error: OSError) -> InputError:
-    """What is said of an address that cannot be served."""
+    """The message for an address that cannot be served."""
     return InputError(f"Cannot serve OpenSees at {host}:{port}: {error.strerror}; choose another port.")
 
 

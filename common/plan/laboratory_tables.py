@@ -183,7 +183,7 @@ class DeviceTable:
 
 @dataclass(frozen=True)
 class LaboratoryTable:
-    """Master or slave: what stands in its laboratory.
+    """Master or slave: its kind of laboratory and its rig.
 
     The slave without a name has the plan's own tables: of the master's kind it is a twin of the master's laboratory.
     """
@@ -198,7 +198,7 @@ class LaboratoryTable:
 
 @dataclass(frozen=True)
 class SlaveLaboratory:
-    """One of several slaves: what stands in its laboratory, and its interface to the structure.
+    """One of several slaves: its kind of laboratory, its rig, and its interface to the structure.
 
     A key that the plan gives in a table of this slave, `[slave.NAME.table]` for example, holds for this slave; the
     others are those of the plan's own table of that name. A compensator is taken whole.

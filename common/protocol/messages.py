@@ -129,7 +129,7 @@ class Stop(NamedTuple):
 
 
 class Extend(NamedTuple):
-    """Master to slaves and recorder: the test has at least so many ticks, because it was held."""
+    """Master to slaves and recorder: the test has at least this many ticks, because it was held."""
 
     session: int
     ticks: int

@@ -24,7 +24,7 @@ class Tally:
         self.reasons: Counter[str] = Counter()
 
     def extend(self, ticks: int) -> None:
-        """Take note that the test has at least so many ticks; it never gets shorter."""
+        """Take note that the test has at least this many ticks; it never gets shorter."""
         self._fates.extend(bytes(max(ticks - len(self._fates), 0)))
 
     def admit(self, seq: int, expected: int) -> bool:

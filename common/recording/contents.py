@@ -100,7 +100,7 @@ def _decode(run: Run, channel: Channel, schema: Schema, messages: list[Message])
 
 
 def _texts(run: Run, topic: str) -> dict[str, str]:
-    """The meaning of a topic's signals as recorded; in a recording without it, as the default topics have it."""
+    """The meaning of a topic's signals as recorded; in a recording without it, that of the default topics."""
     said = run.metadata.get(SIGNALS, {}).get(topic, "")
     try:
         return {name: str(text) for name, (_, text) in json.loads(said).items()}

@@ -1,4 +1,4 @@
-"""The holds of a recorded test, from its events: where its ticks stand in the earthquake's time."""
+"""The holds of a recorded test, from its events: the earthquake's time at each of its ticks."""
 
 from __future__ import annotations
 

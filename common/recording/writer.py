@@ -29,7 +29,7 @@ CHUNK_SIZE = (
 )  # bytes, unpacked: a damaged chunk loses a quarter of a second, and it still compresses well
 REPEAT_BYTES = (
     1 << 20
-)  # schemas and channels, some kilobytes, are repeated after so many bytes: less than a percent
+)  # schemas and channels, some kilobytes, are repeated after this many bytes: less than a percent
 SIGNALS = "signals"  # metadata: by topic, JSON of name -> [unit, text]
 SHARED = "shared"  # of a channel: JSON of the fields that hold a value per slave -> the slaves' roles
 SYNC = getattr(os, "fdatasync", os.fsync)  # fdatasync is cheaper, but not every system has it

@@ -122,12 +122,12 @@ class Safety:
         self._told(before, turn, self.mode)
 
     def follow(self, turn: Turn) -> None:
-        """Take a turn if the present mode has it; otherwise nothing changes."""
+        """Take a turn if the present mode allows it; otherwise change nothing."""
         if self.allows(turn):
             self.take(turn)
 
     def trip(self, cause: Cause, turn: Turn = Turn.TRIP) -> None:
-        """Keep the first cause, and take the turn if the present mode has it."""
+        """Keep the first cause, and take the turn if the present mode allows it."""
         if self.cause is None and (self.allows(turn) or self.mode is Mode.RAMPING):
             self.cause = cause
         self.follow(turn)

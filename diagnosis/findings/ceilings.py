@@ -23,7 +23,7 @@ COORDINATE: dict[str, Coordinate] = {
 }  # by a reading's unit
 PREDICTED = "predicted "  # before the name of a reading
 # Share of a residual's energy below which a coordinate is not listed: 2 % of the energy is 14 % of the rms, which
-# nobody sees in a plot of the residual over that coordinate.
+# is invisible in a plot of the residual over that coordinate.
 FAINT = 0.02
 
 

@@ -1,4 +1,4 @@
-"""What the gap of each part is made of: tolerances, effects with a name, what is left, and noise."""
+"""The composition of each part's gap: tolerances, named effects, the unexplained rest, and noise."""
 
 from __future__ import annotations
 

@@ -148,7 +148,7 @@ def without_effects(search: Search) -> Outcome:
 
 
 def how_well(search: Search) -> Outcome:
-    """Explained where what is left is noise and no nominal parameter is at its bound; otherwise partly, or unknown.
+    """Explained if the rest is noise and no nominal parameter is at its bound; otherwise partly explained or unknown.
 
     An effect that only imitates the true one leaves a systematic residual, however much of the gap it closes.
     """

@@ -126,7 +126,7 @@ def platform_acceleration(system: System, command: Array, motion: Array, rate: A
 
 
 def friction_of(effects: TableEffects | DamperEffects, rate: Array) -> Array:
-    """The friction (ticks,) of a machine at a rate (m/s), as its effects have it."""
+    """The friction (ticks,) of a machine at a rate (m/s), by the model of its effects."""
     sides = 1.0 + effects.friction_asymmetry * np.sign(rate)
     speeds = 1.0 - effects.friction_drop * (1.0 - np.exp(-np.abs(rate) / effects.friction_speed))
     smooth = np.tanh(rate / max(effects.friction_velocity, STILL))
@@ -171,7 +171,7 @@ def of_specimen(site: str, system: System, motion: Array, force: Array, there: M
 
 
 def rate_of(motion: Array, system: System) -> Array:
-    """Rate (ticks,) of a motion (ticks,), m/s, over the interval that ends at each tick, as a simulation has it."""
+    """Rate (ticks,) of a motion (ticks,), m/s, over the interval that ends at each tick, as in a simulation."""
     return np.diff(motion, prepend=motion[:1]) / system.plan.test.interval
 
 

@@ -24,7 +24,7 @@ STRONGEST = 0.2  # of the record, the stretch around the largest motion: some cy
 CORRELATED = 0.5  # s, longer than what a law leaves is correlated within a cycle
 PENALTIES = 10.0 ** np.arange(-8.0, 2.0)  # over the mean square of the features
 HARM = 0.25  # of what is gained in some withheld pieces, the most that may be lost in others: chance loses as it gains
-LEAST = 0.05  # of the energy that must be predicted on withheld time: less would interest nobody
+LEAST = 0.05  # of the energy that must be predicted on withheld time: a smaller share is of no practical use
 SIMPLER = 0.9  # of the error on withheld time, from which on a law that ages is worth its weights
 COVER = 1.96  # standard deviations of a band of 95 %
 FINE = (0.0, 0.002, 0.01, 0.03, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26)
@@ -53,7 +53,7 @@ class Regression:
         return 1.0 - (self.error / self.before) ** 2 if self.before > 0.0 else 0.0
 
     def band(self, x: Array, v: Array) -> Array:
-        """Half width (n,) of the band of 95 % for a motion: wider where the state leaves what was seen."""
+        """Half width (n,) of the band of 95 % for a motion: wider where the state leaves the observed range."""
         rows = preisach.features(self.law[: self.law.size - preisach.count(self.law)], x, v)
         own = np.sum((rows @ self.covariance) * rows, axis=1)
         return np.asarray(COVER * np.sqrt(self.error**2 + np.maximum(own, 0.0)))
@@ -86,7 +86,7 @@ class Crossed:
 
     @property
     def error(self) -> float:
-        """Mean square of what is left."""
+        """Mean square of the residual."""
         return float(np.mean(self.left**2))
 
 
@@ -201,7 +201,7 @@ def law_of(rows: AveragedRows, load: Array, chosen: Mask) -> Array:
 
 
 def together(left: Array, interval: float) -> float:
-    """How many averaged samples (m,) of what is left count as one, because it comes and goes slowly."""
+    """How many averaged samples (m,) of the residual count as one, because it changes slowly."""
     length = max(1, round(CORRELATED / max(AVERAGED, interval)))
     count = left.size // length
     if count < 4:

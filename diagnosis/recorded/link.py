@@ -34,7 +34,7 @@ LATE = 0.15
 SPOILT = 3
 # Share of messages of one age from which on they count as equally old on a real clock, where a few wake-ups are late.
 STEADY = 0.98
-LEAST_STAMPS = 20  # one-way times without which nothing is said of them: their rms is then known within 16 %
+LEAST_STAMPS = 20  # fewest one-way times from which jitter is judged: their rms is then known within 16 %
 TINY = 1e-6  # s, scatter below which one-way times in virtual time are equal: they are computed to the nanosecond
 CERTAIN = 1000.0  # largest number of standard deviations that is stated
 EDGE = 5  # last ticks of a test, whose answers may not have arrived before its end
@@ -49,7 +49,7 @@ class Direction(NamedTuple):
     lost: Mask  # which of these did not
     one_way: Array  # s, of messages whose time stamps are known
     selected: bool  # whether only those are known that were not overtaken
-    overtaken: int  # messages that arrived after a later one, as far as stamps show
+    overtaken: int  # messages that arrived after a later one, according to the time stamps
 
     @property
     def old_share(self) -> float:
@@ -138,7 +138,7 @@ def feedbacks(item: Direction, ticks: Ticks, good: Mask, *, virtual: bool) -> Di
 
 
 def laid(run: Run) -> Ticks:
-    """The topics on the ticks; what is missing is −1 or NaN."""
+    """The topics on the ticks; missing values are −1 or NaN."""
     size = 1 + max((int(values.max()) for values in run.sequences.values() if values.size), default=0)
 
     def column(topic: str, name: str) -> tuple[Array, Mask]:

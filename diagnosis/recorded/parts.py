@@ -314,7 +314,7 @@ class Building:
 
 
 def earlier(x: Array, ticks: float) -> Array:
-    """Series (n, …) that come earlier by so many ticks, by the phases of their spectra: white noise keeps its level.
+    """Series (n, …) advanced by this many ticks, by the phases of their spectra: white noise keeps its level.
 
     On straight lines between samples noise is smaller, and a delay would be found where there is none. Before the first
     and after the last sample the series turn back.
@@ -360,7 +360,7 @@ class LoggedBuilding(Building):
         return np.asarray(a @ M.T + v @ C.T + x @ (K + gravity).T)
 
     def predict(self, system: System) -> Array:
-        """The balance as the nominal building has it, less what the hypothesis leaves of its own.
+        """The balance of the nominal building, less the residual balance of the hypothesis.
 
         What it leaves is at the time and in the unit of the reading, so that neither delay nor gain changes its noise.
         """

@@ -1,4 +1,4 @@
-"""A recording laid out for the diagnosis: every signal on the ticks of one plan, with what is missing marked."""
+"""A recording prepared for the diagnosis: every signal on the ticks of one plan, with missing samples marked."""
 
 from __future__ import annotations
 

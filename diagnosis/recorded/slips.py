@@ -120,7 +120,7 @@ def compared(measured: Array, predicted: Array, noise: float, most: int) -> floa
 
 
 def correlation(one: Array, other: Array, most: int) -> float:
-    """The correlation of largest size within so many ticks of lag."""
+    """The correlation of largest magnitude within this many ticks of lag."""
     size = 2 * one.size
     product = np.fft.irfft(np.fft.rfft(one, size) * np.conj(np.fft.rfft(other, size)), size) / one.size
     near = np.concatenate([product[: most + 1], product[-most:] if most else product[:0]])

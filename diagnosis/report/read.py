@@ -1,4 +1,4 @@
-"""A report read back from JSON: every key, type and range is checked, and what is wrong is said in one sentence."""
+"""A report read back from JSON: every key, type and range is checked, and an error is reported in one sentence."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def schema() -> dict[str, Any]:
 
 
 def text() -> str:
-    """The schema as it is published."""
+    """The text of the published schema."""
     return json.dumps(schema(), indent=1, ensure_ascii=False) + "\n"
 
 

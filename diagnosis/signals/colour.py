@@ -18,7 +18,7 @@ from models.registry import Array
 GRID: Array = np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 400)])  # shares of the Nyquist frequency
 MOST = 16  # order of a model: 0.13 s of averaged samples, longer than a filter of a sensor remembers
 SLOW, SLOW_MOST = 16, 3  # averaged samples in a slow sample, order of the model of those
-SLOW_LEAST = 24  # slow samples without which nothing is said of slow noise
+SLOW_LEAST = 24  # fewest slow samples from which slow noise is judged
 SEGMENT = 24  # samples that a segment must have
 TAIL = 3.5  # standard deviations beyond which an innovation counts as one of the tail
 CLEANED = 2  # rounds in which the tail is cut off before a model is fitted again

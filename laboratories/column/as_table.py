@@ -15,7 +15,7 @@ from models.specimens import SPECIMENS
 from models.system import ColumnEffects
 
 LINEAR, CENTRING = "linear", "self_centring"  # models of a column
-# Fields of `ColumnEffects` that describe one law in the place of the linear column.
+# Fields of `ColumnEffects` that describe one law in place of the linear column.
 OF_YIELDING = (
     "yield_displacement",
     "hardening",

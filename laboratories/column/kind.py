@@ -30,7 +30,7 @@ PARAMETERS = {  # parameters of [actuator] that have a tolerance, by its model
 
 
 class ColumnKind(Kind):
-    """A hydraulic actuator deforms a specimen, which stands for columns of a storey."""
+    """A hydraulic actuator deforms a specimen, which represents columns of a storey."""
 
     name = "column"
     says = "actuator and column"

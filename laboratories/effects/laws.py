@@ -29,7 +29,7 @@ def factor_on(
         site: one of those in `laboratories/effects/sites.py`.
         thing: the quantity that is multiplied, the rest of the effect's name.
         apply: applies it to a system, given the factor; `of_plan` and `of_site` make it.
-        says: the effect in a few words.
+        says: a short description of the effect.
         reference: a source or an equation.
         bounds: smallest and largest factor that is physically possible.
         sizes: factors on both sides of 1, from which a search starts.
@@ -56,7 +56,7 @@ def sets(
         thing: the rest of the effect's name.
         fields: the parameter that sets each field. The first one is the effect's magnitude; at its null value the
             others, which are parameters of shape, have no influence.
-        says: the effect in a few words.
+        says: a short description of the effect.
         reference: a source or an equation.
         further: optional parameters, by the field that each sets; the empty field sets none.
         more: further fields of `Effect`.
@@ -120,7 +120,7 @@ def adds(site: str, thing: str, key: str, parameter: Parameter, *, says: str, re
         thing: the rest of the effect's name.
         key: the table's key.
         parameter: the parameter that is added.
-        says: the effect in a few words.
+        says: a short description of the effect.
         reference: a source or an equation.
     """
     law = partial(added, table=site, key=key)

@@ -44,7 +44,7 @@ class ReadingFault:
 
     name: str  # the field of `SensorEffects` that the parameter sets
     parameter: Callable[[SensorSignal], Parameter]  # the parameter for a signal, with its unit and sizes
-    says: str  # the effect in a few words
+    says: str  # a short description of the effect
     reference: str  # a source or an equation
     in_samples: bool = False  # as in `Effect`
     random: bool = False  # as in `Effect`

@@ -114,7 +114,7 @@ def response(
 
 
 def anew(stroke: Array, interval: float) -> list[tuple[int, float, float]]:
-    """Ticks, strokes (m) and rates (m/s) at which the simulation of a drive without a spring begins anew.
+    """Ticks, strokes (m) and rates (m/s) at which the simulation of a drive without a spring restarts.
 
     Without a spring the error of a force accumulates. Strokes and rates are those of a cubic fitted to `REACH` ticks on
     each side.
@@ -131,7 +131,7 @@ def anew(stroke: Array, interval: float) -> list[tuple[int, float, float]]:
 def in_pieces(
     values: Array, command: Array, ground: Array, interval: float, begins: Sequence[tuple[int, float, float]]
 ) -> tuple[Array, Array]:
-    """Stroke (m) and force (N), each (n,), simulated anew from each beginning."""
+    """Stroke (m) and force (N), each (n,), simulated separately from each beginning."""
     ends = [*(tick for tick, _, _ in begins[1:]), command.size]
     pieces = [
         response(values, command[tick:end], ground[tick:end], interval, place, rate)

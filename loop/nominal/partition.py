@@ -173,7 +173,7 @@ def drift_direction(plan: Plan, role: str = MASTER) -> Array:
 
 
 def felt(plan: Plan, role: str = MASTER) -> Felt:
-    """A role's nominal specimen at the building's scale."""
+    """A role's nominal specimen, scaled to the building."""
     coupling = coupling_of(plan, role)
     return Felt(coupling.stiffness, coupling.damping, coupling.mass)
 

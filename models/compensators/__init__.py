@@ -109,7 +109,7 @@ def build(kind: str, parameters: Mapping[str, float], interval: float, table: st
 
 @jit
 def fed_forward(compensator: Built, wanted: Wanted) -> float:
-    """Command (m) of a method that does without the measurement; the target where the code is of none."""
+    """Command (m) of a method that does not use the measurement; the target where the code is not one of these."""
     code, p, s = compensator.code, compensator.params, compensator.state
     command = wanted.target
     if code == 2:

@@ -54,7 +54,7 @@ def pack(params: Array, _interval: float) -> Array:
 
 @jit
 def series(p: Array, at: int, wanted: Wanted) -> float:
-    """Command (m) from the coefficients that stand at `at`."""
+    """Command (m) from the coefficients that begin at `at`."""
     early = p[at] * wanted.target + p[at + 1] * wanted.rate
     return early + p[at + 2] * wanted.acceleration + p[at + 3] * wanted.jerk
 

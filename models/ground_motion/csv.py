@@ -71,7 +71,7 @@ def parted(source: MotionFile) -> list[CsvLine]:
 
 
 def separator(lines: list[str]) -> str:
-    """The separator of the columns, judged by the first line of numbers; a blank stands for any number of blanks."""
+    """The separator of the columns, judged by the first line of numbers; a blank means any number of blanks."""
     line = next((line for line in lines if line[0] in "+-.0123456789"), lines[0])
     return next((mark for mark in ";\t," if mark in line), " ")
 

@@ -37,7 +37,7 @@ class Header(NamedTuple):
     time: int | None  # None where there is none
     acceleration: int
     second: float  # unit of the time, s
-    unit: str  # of the acceleration, empty where none is said
+    unit: str  # of the acceleration, empty where none is given
 
 
 def columns(cells: list[str], where: str) -> Header:

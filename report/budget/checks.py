@@ -89,7 +89,7 @@ def percentile_check(
 def explained(
     item: ExchangeTicks, segment: str, limit: float, allowed: float, admitted: float, bare: Bare
 ) -> bool:
-    """Whether the machine may have caused so many of the ticks beyond the allowed value that the rest are admitted.
+    """Whether the machine may have caused enough of the ticks beyond the allowed value that the rest are admitted.
 
     A wait of the machine causes one where it is longer than the room between the segment's usual time and the allowed
     one; in the round trip two waits of half that room do so. Shares of independent causes add up, while percentiles do

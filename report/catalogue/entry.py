@@ -87,7 +87,7 @@ def planned(run: Run) -> Plan | None:
 
 
 def of_run(run: Run) -> Facts:
-    """The facts of a recording that was read, as far as it says them."""
+    """The facts that a recording contains."""
     plan, summary = planned(run), run.metadata.get("summary", {})
     motion = run.metadata.get(GROUND, {})
     ticks = [int(value) for name, value in summary.items() if name.endswith("_recorded")]

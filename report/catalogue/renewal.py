@@ -21,7 +21,7 @@ LARGEST_REPORT = (
 
 
 class Renewal(NamedTuple):
-    """What a renewal of the catalogue did: recordings in it, read anew, gone, and not whole."""
+    """The result of a renewal of the catalogue: recordings in it, read again, removed, and incomplete."""
 
     recordings: int
     read: int

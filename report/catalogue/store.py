@@ -12,7 +12,7 @@ from report.catalogue.columns import COLUMNS, NAMES, Facts, Peak
 
 NAME = "catalog.sqlite"
 TABLES = ("recordings", "peaks", "stamps")
-VERSION = 1  # of the tables; a file of another version is made anew
+VERSION = 1  # of the tables; a file of another version is created again
 # Threads that read at once: checksums and unpacking, two thirds of the work, run outside Python's lock.
 READERS = 4
 LARGEST_REPORT = (
@@ -25,7 +25,7 @@ def opened(path: Path, *, create: bool = False) -> Iterator[sqlite3.Connection]:
     """The catalogue, in one transaction that an error undoes; with `create` a new one, or one that may be written.
 
     Raises:
-        InputError: there is none, it is none, or it cannot be written.
+        InputError: the file is missing, is not a catalogue, or cannot be written.
     """
     if not create and not path.exists():
         raise InputError(f"There is no catalogue {path}: make it with rths catalog {path.parent}.")
@@ -48,7 +48,7 @@ def opened(path: Path, *, create: bool = False) -> Iterator[sqlite3.Connection]:
 
 
 def made(base: sqlite3.Connection) -> None:
-    """Make the tables anew."""
+    """Create the tables again."""
     types = ", ".join(f"{one.name} {'TEXT' if one.unit is None else 'REAL'}" for one in COLUMNS)
     for table in TABLES:
         base.execute(f"DROP TABLE IF EXISTS {table}")

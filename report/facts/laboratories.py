@@ -31,7 +31,7 @@ class LaboratoryFacts(NamedTuple):
     """A laboratory as a recording shows it."""
 
     role: str
-    topic: str  # in the recording at hand, which may be one of one slave
+    topic: str  # in the given recording, which may be the part of one slave
     channels: Channels
     pictured: Pictured
     plan: Plan | None = None  # as the role sees it

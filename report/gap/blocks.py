@@ -44,7 +44,7 @@ def strong(text: str) -> Markup:
 
 
 def code(name: str) -> Markup:
-    """A name as it stands in files."""
+    """A name as written in files."""
     return page.block("code", name)
 
 

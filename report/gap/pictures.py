@@ -67,7 +67,7 @@ def literal(text: str) -> str:
 
 
 def wrapped(text: str, width: int) -> str:
-    """Text in lines of at most so many characters."""
+    """Text in lines of at most this many characters."""
     return literal("\n".join(textwrap.wrap(text, width)))
 
 

@@ -36,7 +36,7 @@ def summary(report: Report) -> str:
 
 
 def row(label: str, text: str, most: int = 1) -> list[str]:
-    """A labelled text of at most so many lines; nothing where there is no text."""
+    """A labelled text of at most this many lines; nothing where there is no text."""
     if not text:
         return []
     lines = textwrap.wrap(

@@ -63,7 +63,7 @@ def frame(title: str, body: Markup) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Markup:
-    """A table in a box of its own that scrolls; nothing without rows. Columns of numbers stand to the right."""
+    """A table in a box of its own that scrolls; nothing without rows. Columns of numbers are right-aligned."""
     if not rows:
         return Markup()
     right = [numeric(column) for column in zip(*rows, strict=True)]

@@ -89,7 +89,7 @@ def stiffness_of(lab: LaboratoryFacts, loop: Hysteresis) -> float:
 
 
 def planned_stiffness(axis: Any, stiffness: float, factors: tuple[float, float], x: Values, y: Values) -> str:
-    """The line of a planned stiffness (N/m), as far as forces were recorded, and what the title says of it."""
+    """The line of a planned stiffness (N/m) over the recorded forces, and its text in the title."""
     if not stiffness:
         return ""
     reach = float(np.nanmax(np.abs(y)))

@@ -80,7 +80,7 @@ def decades(axis: Any) -> None:
 
 
 def plain(value: float) -> str:
-    """A number as it is read aloud."""
+    """A number without an exponent."""
     return f"{value:.10g}"
 
 

@@ -168,7 +168,7 @@ def natural_frequencies(recording: Run) -> list[float]:
 
 
 def mark(axis: Any, natural: list[float], *, with_label: bool) -> None:
-    """Upright lines at natural frequencies (Hz), the first of which stands for all in a legend."""
+    """Upright lines at natural frequencies (Hz), the first of which represents all in a legend."""
     text = "natural " + ", ".join(f"{frequency:.2f}" for frequency in natural) + " Hz"
     for place, frequency in enumerate(natural):
         bound(axis, text if with_label and place == 0 else "", x=frequency)

@@ -19,7 +19,7 @@ class Code(NamedTuple):
     """One class or model that a plan names."""
 
     where: str  # table of the plan
-    name: str  # as the plan has it
+    name: str  # as written in the plan
     file: str  # empty where none is found
 
 

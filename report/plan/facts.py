@@ -142,7 +142,7 @@ def transfer_systems(plan: Plan) -> dict[str, Any]:
 
 
 def system(plan: Plan, role: str) -> dict[str, Any]:
-    """A role's laboratory: a table with its damper, or of another kind what stands in it."""
+    """A role's laboratory: a table with its damper, or the devices of another kind."""
     if plan.kinds[role] == TABLE:
         return table(plan.of(role))
     kind = kind_of(plan, role)
@@ -165,7 +165,7 @@ def table(plan: Plan) -> dict[str, Any]:
 
 
 def delay(plan: Plan, found: Findings) -> dict[str, Any]:
-    """The column's path: the delay to expect, what the loop bears, and the margin between; s."""
+    """The column's path: the expected delay (s), the critical delay (s), and the margin between them."""
     expected, critical = expected_delay(plan, found.partition), found.partition.critical_delay
     return {
         "frequency": found.partition.frequency,

@@ -24,7 +24,7 @@ USUAL = (
 )  # s, periods by which a slip is recognised: from low stiff houses to tall or isolated buildings
 LARGEST_DAMPING = 0.5  # a building with many dampers has 0.3
 LEAST_DAMPING = 1e-4  # bare welded steel has 2e-3; a dashpot in kN·s/m is a thousandth
-OFF = 10.0  # specimen over the stiffness that it stands for: cracking makes 3, the least slip of units 1000
+OFF = 10.0  # specimen over the stiffness that it represents: cracking gives 3, the smallest mistake of units 1000
 LARGEST_STROKE = 2.0  # m; the largest shaking tables and dynamic actuators have 1 m
 TICKS_PER_PERIOD = 20.0  # least, with which a second-order integration keeps a period to half a percent
 WEAKEST = 1.0  # m/s², peak of an unscaled record: records for tests have a tenth of g and more
@@ -132,7 +132,7 @@ def damping_slips(ratio: float) -> list[PlanSlip]:
 
 
 def specimen_slip(plan: Plan) -> list[PlanSlip]:
-    """A specimen that is not of the size of what it stands for."""
+    """A specimen whose stiffness differs greatly from the one that it represents."""
     if plan.kinds.get(MASTER) != COLUMN:
         return []
     given, wanted = felt(plan).stiffness, taken_over(plan).stiffness

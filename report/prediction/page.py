@@ -15,7 +15,7 @@ SAID = (
 
 
 def page(found: Prediction, source: str) -> str:
-    """The page's text; `source` names the file with what was found."""
+    """The page's text; `source` names the file with the findings."""
     plan = found.plan
     facts = [
         ("ground motion", f"{found.motion.describe()}, scaled by {plan.ground_motion.scale:g}"),

@@ -25,7 +25,7 @@ SAID = (
     "operator",
     "specimen",
     "notes",
-)  # keys of [report] that stand beside the facts of the test
+)  # keys of [report] that are shown with the facts of the test
 
 
 def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:

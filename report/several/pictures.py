@@ -62,7 +62,7 @@ def colours(count: int) -> list[Any]:
 
 
 def row(axis: Any, runs: Sequence[OneRun], signal: ChosenSignal, shades: Sequence[Any]) -> None:
-    """One signal of all recordings that have it."""
+    """One signal of all recordings that contain it."""
     here = [(run, shade) for run, shade in zip(runs, shades, strict=True) if signal.name in run.signals]
     size = max(float(np.nanmax(np.abs(run.signals[signal.name]), initial=0.0)) for run, _ in here)
     factor, unit = axis_scale(size, here[0][0].units[signal.name])

@@ -42,7 +42,7 @@ def peaks(runs: Sequence[OneRun], signals: Sequence[ChosenSignal]) -> TitledTabl
 
 
 def peak(run: OneRun, name: str) -> float | None:
-    """The largest magnitude of a signal (SI); None where the recording does not have it."""
+    """The largest magnitude of a signal (SI); None where the recording does not contain it."""
     if name not in run.signals:
         return None
     return float(np.nanmax(np.abs(run.signals[name]), initial=0.0))

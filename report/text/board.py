@@ -52,7 +52,7 @@ KNOWN = {
         BoardRow("round_trip", "round trip", 1e6, "µs", "9.0f"),
     )
 }
-BESIDE = ("tick", "t", "missed", "earthquake_time", "rate")  # of a report: no row of its own
+BESIDE = ("tick", "t", "missed", "earthquake_time", "rate")  # values of a report that have no row
 LABEL = len("column force")  # columns at least
 
 

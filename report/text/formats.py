@@ -112,13 +112,13 @@ def bare_percent(value: float) -> str:
 
 
 def blocks(share: float, width: int) -> str:
-    """A share between 0 and 1 as a bar of so many characters."""
+    """A share between 0 and 1 as a bar of this many characters."""
     filled = round(width * min(max(share, 0.0), 1.0))
     return "█" * filled + "·" * (width - filled)
 
 
 def percent(value: object, places: int | None = None) -> str:
-    """A share in percent, with two digits, or with so many decimals where a limit stands beside it."""
+    """A share in percent, with two digits, or with this many decimals where it is shown with a limit."""
     number = as_float(value)
     if not math.isfinite(number):
         return MISSING
@@ -173,7 +173,7 @@ def reading(value: float, unit: str) -> str:
 
 
 def fixed(value: float, places: int) -> str:
-    """A number with so many decimals, and no sign before a zero."""
+    """A number with this many decimals, and no sign before a zero."""
     return f"{value:z.{places}f}"
 
 

@@ -34,7 +34,7 @@ class Progress:
         self._now: tuple[str, int, int] = ("", 0, 0)
         self._said: tuple[str, int, int] | None = None
         self._next = self._began + UNSAID
-        self._width = 0  # of the line that stands on the terminal
+        self._width = 0  # of the line that is on the terminal
         self._ended = threading.Event()
         self._writer = threading.Thread(target=self._write, name="progress", daemon=True)
 
@@ -70,7 +70,7 @@ class Progress:
         self._stream.flush()
 
     def text(self, spent: float) -> str:
-        """The line after so many seconds."""
+        """The line after this many seconds."""
         what, done, total = self._now
         counted = f"{done} of {total}" if total else ""
         parts = ", ".join(part for part in (what, counted, f"{spent:.0f} s") if part)

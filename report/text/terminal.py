@@ -46,7 +46,7 @@ class RunProgress:
         self._live = self._stream.isatty() and os.environ.get("TERM") != "dumb"
         self._next = 0.0
         self._board = Board(duration)
-        self._drawn = 0  # lines of the board that stand on the terminal
+        self._drawn = 0  # lines of the board that are on the terminal
 
     def show(self, data: Mapping[str, Any]) -> None:
         """Show one report of progress."""

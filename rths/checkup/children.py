@@ -62,7 +62,7 @@ def exchange(interval_ns: int, length: float, mode: str) -> tuple[dict[str, Any]
     ):
         # Not `communicate`, which would end the child's standard input; its few lines fit into the pipes.
         ended = first_ended((master, slave), length + GRACE)
-        master.kill()  # where the slave has failed, nobody would answer it
+        master.kill()  # where the slave has failed, there would be no answer
         said = master.stdout.read() if master.stdout else ""
         complaint = ended.stderr.read() if ended.stderr else ""
         granted, *found = map(json.loads, said.splitlines()) if said else [{}]

@@ -29,7 +29,7 @@ def nearest(folder: Path) -> Path:
 
 
 def there(place: Path) -> bool:
-    """Whether a file or folder is there, as far as this user may know."""
+    """Whether a file or folder exists, as far as this user may see."""
     try:
         return place.exists()
     except PermissionError:

@@ -29,7 +29,7 @@ TEST = "doctor"
 # s, for the other process to answer: both start at once, and imports take many seconds under load.
 PATIENCE = 30.0
 WARM = 100  # exchanges before those that count: they fill caches, and zenoh sets up its routes
-REPEAT = 0.02  # s, between attempts to be heard for the first time
+REPEAT = 0.02  # s, between attempts to get the first answer
 IDLE = 0.05  # s, after which a process without messages looks whether the doctor has ended: a user does not notice it
 
 

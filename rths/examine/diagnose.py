@@ -119,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def write_found(path: Path, found: FoundReality, force: bool) -> None:
-    """Write what was found as a reality; a file beside it holds laws that were learned and how sure all of it is."""
+    """Write what was found as a reality; a file beside it holds the learned laws and the uncertainties."""
     import numpy as np
     import tomli_w
 

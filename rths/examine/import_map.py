@@ -120,7 +120,7 @@ class ImportMap:
 
     @property
     def static(self) -> bool:
-        """Whether each row is one tick, whatever its time."""
+        """Whether each row is one tick, without regard to its time."""
         return self.table.static
 
 

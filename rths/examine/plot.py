@@ -65,7 +65,7 @@ def described(name: str, text: str) -> str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw what was asked for, or whatever the recording has signals for."""
+    """Draw the named pictures, or all for which the recording has signals."""
     from common.recording.reader import read
     from report.facts.laboratories import views
 
@@ -155,7 +155,7 @@ def place_of(args: argparse.Namespace) -> PictureTarget:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a path is a folder; a name that no file can have is none."""
+    """Whether a path is a folder; False for a name that no file can have."""
     try:
         return path.is_dir()
     except OSError:

@@ -168,7 +168,7 @@ def write_latency(report: dict[str, Any]) -> None:
 
 
 def write_checks(report: dict[str, Any]) -> None:
-    """A table of the checks: what was found, and what is needed."""
+    """A table of the checks: the values found, and those needed."""
     from report.text.terminal import table
 
     rows = [["check", "found", "needed", ""]]

@@ -175,7 +175,7 @@ def usage(*, signs_certificates: bool) -> x509.KeyUsage:
 
 
 def general_name(host: str) -> x509.GeneralName:
-    """A host as a certificate has it; raises InputError."""
+    """A host in the form of a certificate; raises InputError."""
     from cryptography import x509
 
     try:

@@ -188,7 +188,7 @@ def diagnose_cases(
     args: argparse.Namespace,
     tell: Tell,
 ) -> None:
-    """Diagnose the recordings in the folder `place`, and keep each answer as soon as it is said."""
+    """Diagnose the recordings in the folder `place`, and keep each answer as soon as it is there."""
     from validation.blind.judge import diagnose_all
 
     if not recorded:
@@ -222,7 +222,7 @@ def predict_cases(
     args: argparse.Namespace,
     tell: Tell,
 ) -> list[PredictedCase]:
-    """The predictions of all next tests, judged, in the order of the cases; `place` has what was found."""
+    """The predictions of all next tests, judged, in the order of the cases; `place` holds the findings."""
     from validation.blind.predicted.predict import predict_all
 
     work = [(one, (place / recorded[one.case.index].name).with_suffix(".toml")) for one in following]

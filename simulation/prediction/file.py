@@ -54,7 +54,7 @@ def write(path: Path, found: Prediction, source: str) -> None:
 
 
 def about(run: Run) -> dict[str, object]:
-    """The figures of a prediction that was read; raises InputError where the recording is none."""
+    """The figures of a prediction that was read; raises InputError where the recording is not a prediction."""
     given = run.metadata.get(ABOUT, {})
     try:
         figures = json.loads(given["figures"])

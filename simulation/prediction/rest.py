@@ -1,4 +1,4 @@
-"""The unexplained rest of a gap as an error of the predicted signals, which grows beyond the motion that was seen.
+"""The unexplained rest of a gap as an error of the predicted signals, which grows beyond the observed motion.
 
 The error of a signal is a share of its analytic signal with a random phase: it has the frequencies of the signal, and
 rises and falls with its envelope.
@@ -48,7 +48,7 @@ class RangeSeen:
         return float(self.ratios[-1]) if self.ratios.size else 0.0
 
     def since(self, interval: float) -> float | None:
-        """The time (s) from which on the motion is beyond what was seen; None where it never is."""
+        """The time (s) from which on the motion is beyond the observed range; None where it never is."""
         return float(np.argmax(self.ratios > BEYOND)) * interval if self.ratio > BEYOND else None
 
 

@@ -33,7 +33,7 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class IntensityTable:
-    """`[intensity]`: the oscillator whose spectral acceleration stands beside the peak ground acceleration."""
+    """`[intensity]`: the oscillator whose spectral acceleration is given beside the peak ground acceleration."""
 
     period: float = key("of the oscillator, 0 for none", default=0.0, unit="s", least=0.0)
     damping_ratio: float = key("of the oscillator", default=0.05, least=0.0, most=1.0)
@@ -160,7 +160,7 @@ def plan_path(name: str, base: Path) -> Path:
 
 
 def check(sweep: Sweep) -> None:
-    """Raise PlanError where names meet twice, or the sweep has too many rows."""
+    """Raise PlanError where a name occurs twice, or the sweep has too many rows."""
     names = [one.name for one in sweep.compensators]
     for name in names:
         if names.count(name) > 1:
@@ -177,7 +177,7 @@ def check(sweep: Sweep) -> None:
 
 
 def listed(tables: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
-    """The tables of an array `[[name]]`; raises PlanError where it is none."""
+    """The tables of an array `[[name]]`; raises PlanError where it is not an array of tables."""
     given = tables.get(name, [])
     if not isinstance(given, list) or not all(isinstance(one, dict) for one in given):
         raise PlanError(f"'{name}' must be tables [[{name}]], not {given!r}.")
@@ -210,7 +210,7 @@ def motion(given: Mapping[str, Any], plan: Plan, base: Path) -> SweptMotion:
 
 
 def scales(given: object) -> tuple[float, ...]:
-    """The factors on a motion: numbers, or so many from one to another at equal ratios.
+    """The factors on a motion: numbers, or a count of them from one to another at equal ratios.
 
     Raises:
         PlanError: they are neither, or not above 0.
@@ -291,7 +291,7 @@ def changed(written: dict[str, Any], name: str, value: Any) -> None:
 
 
 def described(sweep: Sweep) -> str:
-    """What is multiplied, in a few words."""
+    """A short text on what is multiplied."""
     counts: Sequence[tuple[int, str]] = (
         (len(sweep.compensators), "compensator"),
         (sweep.combinations, "combination of parameters"),
@@ -303,6 +303,6 @@ def described(sweep: Sweep) -> str:
 
 
 def plural(count: int, word: str) -> str:
-    """A word for so many."""
+    """A count with its noun in singular or plural."""
     head, _, rest = word.partition(" ")
     return word if count == 1 else f"{head}s {rest}".rstrip()

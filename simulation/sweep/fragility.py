@@ -20,7 +20,7 @@ Passed = NDArray[np.bool_]
 
 Z_90 = 1.6448536269514722  # the normal distribution's 95 % point: both ends of an interval of 90 %
 STEPS = 100  # of Fisher's scoring; it needs about ten, because the likelihood is concave
-LEAST = 0.5  # tests that a level must let expect on either side, for its share to be judged
+LEAST = 0.5  # fewest expected tests on either side of a level whose share is judged
 SMALL = 1e-10  # of a step, in units of ln(intensity)
 
 
@@ -140,7 +140,7 @@ def probit(x: Array, n: Array, k: Array) -> tuple[float, float, Array]:
 def agreement(eta: Array, n: Array, k: Array) -> float:
     """Probability of a deviance as large as that of k of n tests from the chances Φ(η), 1 where two levels fix both.
 
-    Levels at which less than `LEAST` tests are expected on one side say nothing where they agree; they are left out.
+    Levels at which less than `LEAST` tests are expected on one side carry no information; they are left out.
     """
     p = special.ndtr(eta)
     telling = (n * np.minimum(p, 1.0 - p) >= LEAST) | (k != np.round(n * p))

@@ -1,4 +1,4 @@
-"""What the tests of a sweep need of this machine's files, which travels with every task.
+"""The files of this machine that the tests of a sweep need, sent with every task.
 
 The records of motion, the files of kinds of laboratory of the user's, and the laws beside a reality are taken along as
 bytes. The worker lays them into a temporary folder named after their content, once.

@@ -38,12 +38,12 @@ class Task(NamedTuple):
     """The tests `number · SIZE` and following of a sweep."""
 
     luggage: Luggage
-    digest: str  # of all that the rows depend on, by which a worker knows the luggage again
+    digest: str  # of all that the rows depend on; a worker recognizes the luggage by it
     number: int
 
 
 class Excitation(NamedTuple):
-    """A motion as a test of the sweep has it, and how strong it is."""
+    """A ground motion as a test of the sweep uses it, and its intensity."""
 
     rows: Array  # (2, ticks + 1), of `loop.substructure.ground_rows`
     acceleration: float  # m/s², peak

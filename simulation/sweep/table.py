@@ -1,4 +1,4 @@
-"""The table of a sweep: one row for each test, in the order of the sweep, with what computes it again."""
+"""The table of a sweep: one row for each test, in the order of the sweep, and what is needed to compute it again."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def about(sweep: Sweep, given: Luggage) -> dict[str, Any]:
 
 
 def table(path: Path, sweep: Sweep, way: Way, *, force: bool = False, tell: Tell = untold) -> pa.Table:
-    """Compute a sweep into a Parquet file; rows that are there of an earlier call are not computed again.
+    """Compute a sweep into a Parquet file; rows of an earlier call are not computed again.
 
     Raises:
         InputError: the sweep cannot be computed, or the table cannot be written.

@@ -34,7 +34,9 @@ def spread(function: Callable[[Item], Result], items: Sequence[Item], address: s
         LostError: the scheduler is lost.
     """
     distributed = needed("distributed", "--dask")
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it logs is said in one sentence below
+    logging.getLogger("distributed").setLevel(
+        logging.CRITICAL
+    )  # its log messages are reported in one sentence below
     with connected(distributed, address) as client:
         waiting = iter(items)
         running = distributed.as_completed(loop=client.loop)

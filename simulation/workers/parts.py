@@ -1,6 +1,6 @@
 """The rows of a table that are done, kept in files beside it until all are there.
 
-`TABLE.parts/` holds what the table is of and one file for every finished batch. A batch is written as a whole: into a
+`TABLE.parts/` describes the table and holds one file for every finished batch. A batch is written as a whole: into a
 file of another name, which is synced and then renamed. So a command that is killed loses the batches under way only,
 and the same command goes on with the others. Only the process that spreads the work writes here.
 """
@@ -41,7 +41,7 @@ class Batch(NamedTuple):
 
 
 class Way(NamedTuple):
-    """How work is spread: by so many processes, −1 for one per processor, or over a Dask cluster."""
+    """How work is spread: over this many processes, −1 for one per processor, or over a Dask cluster."""
 
     jobs: int = 1
     dask: str = ""
@@ -91,7 +91,7 @@ def parts(
 ) -> Iterator[Parts]:
     """The parts of a table within the context; they are removed after it, unless an error ends it.
 
-    `about` says what the table is of, by names; with `force` the parts of another one are removed.
+    `about` describes the table, by names; with `force` the parts of another one are removed.
 
     Raises:
         InputError: parts of another table are there and `force` is not given, another process is at work on them, or
@@ -156,7 +156,7 @@ def another(folder: Path, given: str, text: str) -> InputError:
 def complete(
     found: Parts, function: Callable[[Any], Batch], tasks: Sequence[Any], way: Way, tell: Tell = untold
 ) -> pa.Table:
-    """Compute the batches that are not there, `function` of task k being batch k; the whole table.
+    """Compute the batches that are not there, `function` of task k being batch k; returns the whole table.
 
     Raises:
         InputError, LostError: as `spread`.

@@ -1,4 +1,4 @@
-"""The versions by which a result can be computed again."""
+"""The versions that are needed to compute a result again."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class SettingSummary(NamedTuple):
 
 
 class GoalCheck(NamedTuple):
-    """One goal: what was found, what is wanted."""
+    """One goal: the value found, and the value wanted."""
 
     name: str
     value: str
@@ -79,7 +79,7 @@ class BenchmarkEvidence(NamedTuple):
 def gather(
     folder: Path, settings: Mapping[str, CompensatorTable], plants: int, seed: int, way: Way, tell: Tell
 ) -> BenchmarkEvidence:
-    """All tests of the benchmark, whose table stands in the folder."""
+    """All tests of the benchmark, whose table is in the folder."""
     tell("critical delays", 0, 0)
     critical = critical_delays()
     results = played(folder, settings, plants, seed, way, tell)

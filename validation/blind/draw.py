@@ -173,7 +173,7 @@ def draw_effect(lot: Lot, kind: str, name: str, library: Library, *, own: bool =
 
 
 def draw_material(lot: Lot, name: str) -> Laid:
-    """A material of OpenSees with its parameters, in the place of the master's column."""
+    """A material of OpenSees with its parameters, in place of the master's column."""
     from validation.blind.labs.materials import BENDS, MATERIALS
 
     ranges = {"d": BENDS, **MATERIALS[name.removeprefix("opensees.")].ranges}

@@ -31,7 +31,7 @@ class DiagnosisAnswer(NamedTuple):
     error: str = ""
 
 
-GRACE = 3.0  # s, in which an interrupted process may end its own workers; nobody waits longer after Ctrl-C
+GRACE = 3.0  # s, in which an interrupted process may end its own workers: the longest wait after Ctrl-C
 NONE = DiagnosisAnswer({}, float("nan"), "the diagnosis gave no answer")
 
 
@@ -44,9 +44,9 @@ def diagnose_all(
     done: Callable[[Diagnosed], None] = lambda _answer: None,
     found: bool = False,
 ) -> dict[str, DiagnosisAnswer]:
-    """Answers by the name of the recording; `done` is called with what is said of each, as soon as it is said.
+    """Answers by the name of the recording; `done` is called with each answer as soon as it is there.
 
-    With `found` that includes the files that say what was found in it.
+    With `found` that includes the files with the findings.
 
     Raises:
         InputError: the process failed.

@@ -1,4 +1,4 @@
-"""The cases of a blind trial that are done, of which an interrupted trial goes on."""
+"""The finished cases of a blind trial, from which an interrupted trial continues."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from validation.blind.record import RecordedCase
 from validation.blind.worker import ENDINGS, Diagnosed
 
 TABLE = "results.parquet"
-# of a case that is done: its recording and the answer as JSON, and the files that say what was found
+# of a case that is done: its recording and the answer as JSON, and the files with the findings
 SCHEMA = pa.schema(
     [
         pa.field("recorded", pa.string()),

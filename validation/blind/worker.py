@@ -25,7 +25,7 @@ from simulation.workers.pool import spread
 
 RECORDING = ".mcap"
 OTHER = ".other"  # suffix of a recording of the same laboratories, on which the finding is judged
-ENDINGS = (".toml", ".npz")  # of the two files that say what was found in a recording
+ENDINGS = (".toml", ".npz")  # of the two files with the findings in a recording
 DIAGNOSIS = "rths.examine.diagnose:diagnose_recording"
 
 
@@ -41,7 +41,7 @@ def find(reference: str) -> Any:
 
 
 class Diagnosed(NamedTuple):
-    """The answer of a diagnosis on a recording as JSON holds it, and by suffix the files that say what was found."""
+    """The answer of a diagnosis on a recording as JSON values, and the files with its findings by suffix."""
 
     name: str
     answer: dict[str, Any]

@@ -17,7 +17,7 @@ from validation.faults.wire import INSIDER, Letter, WireRoute
 
 LONGEST = 300  # bytes of noise, so that frames shorter and longer than real messages are tried
 OTHER_SESSION = 77  # any number but the session's
-FAR = 100_000  # numbers ahead: more than the ticks of any test here, so that a loop that believed it would hear no more
+FAR = 100_000  # numbers ahead: more than the ticks of any test here, a loop that took it would reject all later ones
 
 
 def letter(message: Message, key: codec.Key, origin: str) -> Letter:

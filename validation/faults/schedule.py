@@ -82,7 +82,7 @@ KINDS: dict[str, FaultKind] = {
 class InjectedFault:
     """One fault from a world time (s) for a duration; `where` is a role, `A>B` or `A<>B`.
 
-    A kind without a duration is instantaneous. A clock differs from the beginning, whatever `at` is.
+    A kind without a duration is instantaneous. A clock differs from the beginning, independently of `at`.
     """
 
     kind: str

@@ -22,7 +22,7 @@ Tables = dict[str, Any]
 
 
 class FoundReality(NamedTuple):
-    """The tables of a reality file, and what stands beside it: laws, and how sure all of it is."""
+    """The tables of a reality file, and the contents of the file beside it: learned laws, and uncertainties."""
 
     tables: Tables
     learned: tuple[LearnedEntry, ...]

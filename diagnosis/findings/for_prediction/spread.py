@@ -1,4 +1,4 @@
-"""How sure a diagnosis is: covariance of its parameters, noise of the sensors, what is left, and the ranges seen."""
+"""The uncertainty of a diagnosis: parameter covariance, sensor noise, the unexplained rest, and observed ranges."""
 
 from __future__ import annotations
 

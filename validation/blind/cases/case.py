@@ -1,4 +1,4 @@
-"""A case of the blind trial: the plan that everybody knows, and the true laboratories."""
+"""A case of the blind trial: the published plan, and the true laboratories."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Laid:
 
 @dataclass(frozen=True)
 class Case:
-    """One test: the plan that everybody knows, and the hidden truth."""
+    """One test: the published plan, and the hidden truth."""
 
     index: int
     kind: str
@@ -97,7 +97,7 @@ def of_role(tables: Mapping[str, Any], role: str) -> dict[str, Any]:
 
 
 def with_rig(tables: Mapping[str, Any], role: str, rig: dict[str, Any]) -> dict[str, Any]:
-    """The tables of a reality with a rig in the place of a role's laboratory."""
+    """The tables of a reality with a rig in place of a role's laboratory."""
     if role in (MASTER, SLAVE):
         return {**tables, role: {"rig": rig}}
     slaves = dict(tables.get(SLAVE, {}))

@@ -65,7 +65,7 @@ class CaseNames:
         return self.whole(item.role, item.site, item.site)
 
     def heard(self, slave: str, report: Report) -> Heard:
-        """A report on the master and the slave of that name."""
+        """The report on the master and the slave of that name."""
         role = slave_role(slave) if slave or self._slaves else MASTER
 
         def whole(name: str) -> str:

@@ -21,7 +21,7 @@ STATE = 8
 
 
 class Servo(NamedTuple):
-    """True parameters of the actuator; zero is none of an effect."""
+    """True parameters of the actuator; zero means that the effect is absent."""
 
     step: float  # s
     steps: float  # of an interval

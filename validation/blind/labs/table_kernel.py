@@ -40,7 +40,7 @@ class TableMemory(NamedTuple):
 
 
 class TrueTable(NamedTuple):
-    """True parameters of table and damper; zero is none of an effect."""
+    """True parameters of table and damper; zero means that the effect is absent."""
 
     step: float  # s
     steps: float  # of an interval

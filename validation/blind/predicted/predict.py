@@ -53,8 +53,8 @@ class PredictedCase:
     )
     said: list[str]  # sentences of the prediction and of the comparison with the recorded test
     signals: Mapping[str, float] = field(default_factory=dict)  # share inside by signal
-    # Where the prediction says that the test leaves what was seen, by role: how many times the largest amplitude, and
-    # which share of the target's energy lies at other frequencies.
+    # Where the prediction states that the test leaves the observed range, by role: how many times the largest
+    # amplitude, and which share of the target's energy lies at other frequencies.
     farther: Mapping[str, float] = field(default_factory=dict)
     elsewhere: Mapping[str, float] = field(default_factory=dict)
     stopped: str = ""  # why the next test ended early, empty where it was completed
@@ -143,7 +143,7 @@ def square(simulated: Array, true: Array, noise: float) -> float:
 
 
 def keep(folder: Path, found: Path, played: PlayedTest, predicted: Path) -> None:
-    """Copy what was found, the prediction and the played test into a folder."""
+    """Copy the findings, the prediction and the played test into a folder."""
     import shutil
 
     folder.mkdir(exist_ok=True)

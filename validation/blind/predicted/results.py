@@ -61,7 +61,7 @@ def cells(one: PredictedCase) -> tuple[str, ...]:
 
 
 def beyond(one: PredictedCase) -> str:
-    """Where the prediction says that the test leaves what was seen."""
+    """Where the prediction states that the test leaves the observed range."""
     parts = [f"{role} {ratio:.2g} × the amplitude" for role, ratio in one.farther.items()]
     parts += [f"{role} {percent(share, 0)} at other frequencies" for role, share in one.elsewhere.items()]
     return f"said beyond what was seen: {', '.join(parts)}" if parts else ""

@@ -298,7 +298,7 @@ def confusion(outcomes: Iterable[Outcome]) -> Matrix:
 
 
 def said(item: Outcome, true: str) -> str:
-    """The verdict in one word of the confusion matrix."""
+    """The verdict as a label of the confusion matrix."""
     if item.named and not item.surplus and (item.status in NAMING or item.kind in ("clean", "unknown")):
         return true
     words = {"no_gap": "no gap", "unknown_effect": "unknown", "not_enough_data": "not enough data"}

@@ -28,7 +28,7 @@ SIZE = yielding.SIZE + 6
 
 
 class TrueSpecimen(NamedTuple):
-    """True parameters of the column; zero is none of an effect."""
+    """True parameters of the column; zero means that the effect is absent."""
 
     stiffness: float  # N/m
     yielding: float = 0.0  # formula
@@ -55,7 +55,7 @@ class TrueSpecimen(NamedTuple):
 
 @jit
 def slipped(deformation: float, gap: float) -> float:
-    """Deformation felt behind a rounded gap: `δ − g/2·tanh(2δ/g)`, g the whole gap."""
+    """Effective deformation behind a rounded gap: `δ − g/2·tanh(2δ/g)`, g the whole gap."""
     if gap <= 0.0:
         return deformation
     return deformation - 0.5 * gap * math.tanh(2.0 * deformation / gap)
