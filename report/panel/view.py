@@ -112,11 +112,12 @@ class View:
     def _machine(self, looked: Looked) -> dict[str, Any]:
         """What this machine lacks, as `rths doctor` says it."""
         found = looked.found
-        lacks = [
-            {"name": one["name"], "found": one["found"], "needed": one["needed"], "advice": one["advice"]}
-            for one in found.get("checks", ())
-            if not one["passed"]
-        ]
+        failed: dict[str, list[str]] = {}
+        for one in found.get("checks", ()):
+            if not one["passed"]:
+                failed.setdefault(one["advice"], []).append(one["name"])
+        lacks = [f"{', '.join(names)}: {advice}" for advice, names in failed.items()]
+        lacks += [*found["realtime"]["missing"], *found["notes"]] if found else []
         said = found["verdict"]["sentence"] if found else ""
         return {"lacks": lacks, "verdict": said, **self._looked(looked)}
 

@@ -150,7 +150,7 @@ def test_a_screen_reader_finds_names_roles_and_announcements(panels: Panels, sho
         by_role("alert").filter(has_text="The panel is not heard").wait_for(timeout=HANG_S * 1e3)
         assert by_role("button", name="Start", exact=True).is_disabled()
         assert not by_role("button", name="Emergency stop", exact=True).is_disabled()
-        page.wait("document.getElementById('phase').textContent.endsWith(' ago)')", HANG_S)
+        page.wait("document.getElementById('phase-age').textContent.endsWith(' ago')", HANG_S)
 
 
 def test_two_browsers_see_each_others_orders_and_a_page_of_an_ended_panel_gives_none(

@@ -199,7 +199,9 @@ def test_plan_and_machine_are_shown_with_the_results_of_their_commands(watched: 
     plan = plan_path(None)
     found = facts(load(plan), plan)
     failed = {"name": "priority", "found": "none", "needed": "49", "advice": "Grant it.", "passed": False}
-    machine = {"checks": [failed, failed | {"passed": True}], "verdict": {"sentence": "It lacks one thing."}}
+    checks = [failed, failed | {"passed": True}, failed | {"name": "wake-up"}]
+    machine = {"checks": checks, "notes": ["A rival runs."], "verdict": {"sentence": "It lacks one thing."}}
+    machine["realtime"] = {"missing": ["There is no right to it."]}
     watched.clock.time += SECOND
     looked = {"plan": Looked(found, at=99 * SECOND), "machine": Looked(machine, at=100 * SECOND)}
     state = watched.state(**looked)
@@ -210,7 +212,9 @@ def test_plan_and_machine_are_shown_with_the_results_of_their_commands(watched: 
     assert any("Pre-flight would let this test begin" in text for text in state["plan"]["concerns"])
     assert next(one for one in state["plan"]["peaks"] if one["name"] == "column force")["share"] < 0.2
     assert state["machine"]["lacks"] == [
-        {name: failed[name] for name in ("name", "found", "needed", "advice")}
+        "priority, wake-up: Grant it.",
+        "There is no right to it.",
+        "A rival runs.",
     ]
     assert state["machine"]["verdict"] == "It lacks one thing."
     busy = watched.state(plan=Looked(at=SECOND, busy=True))["plan"]
