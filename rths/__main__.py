@@ -133,7 +133,7 @@ EXAMPLES = {
     "panel": "rths panel default --duration 20",
     "start": "rths start --reason ready",
     "stop": "rths stop --emergency",
-    "hold": 'rths hold --reason "a look at the cracks"',
+    "hold": "rths hold --reason cracks",
     "resume": "rths resume",
     "reset": "rths reset --reason inspected",
     "init": "rths init my_test",
