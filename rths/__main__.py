@@ -31,6 +31,7 @@ VERBS = {
     "simulate": "compute the closed loop of nominal models",
     "predict": "predict the next test from what a diagnosis found, with a band",
     "update": "write a plan with the nominal models that a diagnosis found",
+    "campaign": "play tests and diagnose them, each time the one that tells most, until the cause is certain",
     "sweep": "compute many tests of a plan: motions, scales, parameters, compensators, drawn laboratories",
     "fragility": "fit the chance that a limit is passed against the motion's intensity to the table of a sweep",
     "bench": "test one part alone, recorded",
@@ -57,7 +58,7 @@ VERBS = {
 }
 
 FOLDERS = {
-    "rths.perform": ("run", "serve", "live", "panel", "start", "stop", "hold", "resume", "reset"),
+    "rths.perform": ("run", "campaign", "serve", "live", "panel", "start", "stop", "hold", "resume", "reset"),
     "rths.prepare": (
         "init",
         "check",
@@ -141,6 +142,7 @@ EXAMPLES = {
     "simulate": "rths simulate default --ideal --no-amd",
     "predict": "rths predict default --found found.toml --scale 0.2 --html prediction.html",
     "update": "rths update default --found found.toml -o corrected.toml",
+    "campaign": "rths campaign goal.toml -o runs/campaign",
     "sweep": "rths sweep sweep.toml --jobs 2 -o sweep.parquet",
     "fragility": "rths fragility sweep.parquet --quantity peak_drift --limit 20mm --html fragility.html",
     "bench": "rths bench actuator paper -o actuator.mcap",

@@ -1,0 +1,146 @@
+"""The choice of the next test, or of the end of the campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from simulation.campaign.goal import GoalTable
+from simulation.campaign.steps import Begun, Decided, Diagnosed, Ended, Option, Step
+
+Choice = Callable[[Sequence[Step]], Decided | Ended]
+Pick = Callable[
+    [Sequence[Option], int], Option
+]  # of the options that may be played, for the test of a number
+
+# Share of the best test's information within which another one tells as much: then the one that strains the specimens
+# least is played. The prediction of the information itself is not better than that.
+AS_MUCH = 0.1
+# Bits below which no test tells anything: it would change a probability of 95 % by less than one point.
+LEAST = 0.01
+
+CERTAIN, INSEPARABLE, GAP, TESTS, LIMITS, SILENT = (
+    "certain",
+    "inseparable",
+    "gap",
+    "tests",
+    "limits",
+    "silent",
+)
+
+
+def best(options: Sequence[Option], _test: int) -> Option:
+    """The option that tells most; of several that tell as much, the one with the smallest drift."""
+    most = max(one.bits for one in options)
+    return min(
+        (one for one in options if one.bits >= (1.0 - AS_MUCH) * most),
+        key=lambda one: (one.drift, -one.bits, one.candidate),
+    )
+
+
+def strongest(options: Sequence[Option], _test: int) -> Option:
+    """The option with the largest drift."""
+    return max(options, key=lambda one: (one.drift, -one.candidate))
+
+
+def at_random(seed: int, options: Sequence[Option], test: int) -> Option:
+    """An option at random, the same for the same seed and number of the test."""
+    return options[int(np.random.default_rng([seed, test]).integers(len(options)))]
+
+
+def choosing(head: GoalTable, pick: Pick = best) -> Choice:
+    """The choice for a goal."""
+    return partial(choose, head, pick)
+
+
+def choose(head: GoalTable, pick: Pick, steps: Sequence[Step]) -> Decided | Ended:
+    """The next test after the steps of a log, which end with `Begun` or `Diagnosed`, or the end."""
+    last = steps[-1]
+    if isinstance(last, Begun):
+        return first(last)
+    assert isinstance(last, Diagnosed)  # noqa: S101 - no other step asks for a choice
+    return end(head, last) or following(pick, steps, last)
+
+
+def first(begun: Begun) -> Decided | Ended:
+    """The first test: nothing is known yet of the laboratories, so it is the one with the smallest drift."""
+    left = [one for one in begun.options if not one.refused]
+    if not left:
+        return none_left(begun.options)
+    chosen = min(left, key=lambda one: (one.drift, one.candidate))
+    return Decided(1, chosen.candidate, 0.0, "The first test is the one with the smallest drift.")
+
+
+def end(head: GoalTable, last: Diagnosed) -> Ended | None:
+    """The end that a diagnosis makes; None where another test is asked for."""
+    if head.gap > 0.0 and last.gap <= head.gap:
+        return Ended(
+            GAP,
+            f"The gap that is left, {100.0 * last.gap:.2g} %, is within the {100.0 * head.gap:.2g} % asked for.",
+        )
+    top = last.causes[0]
+    if top.probability >= head.certain:
+        return Ended(CERTAIN, f"The cause is certain: {named(top.effects)}, with {percent(top.probability)}.")
+    if len(last.same) > 1 and last.together >= head.certain:
+        return Ended(
+            INSEPARABLE,
+            f"No test within these limits can tell {' from '.join(map(named, last.same))}; one of them is the cause, "
+            f"with {percent(last.together)}.",
+        )
+    if last.test >= head.tests:
+        return Ended(TESTS, f"All {head.tests} tests are played; the most probable cause is {likely(last)}.")
+    return None
+
+
+def following(pick: Pick, steps: Sequence[Step], last: Diagnosed) -> Decided | Ended:
+    """The next test, or the end where none may be played or none tells anything."""
+    played = {one.candidate for one in steps if isinstance(one, Decided)}
+    new = [one for one in last.options if one.candidate not in played]
+    left = [one for one in new if not one.refused]
+    if not left:
+        return none_left(new)
+    if max(one.bits for one in left) < LEAST:
+        return Ended(
+            SILENT,
+            "No test within these limits tells more about the cause than is known; the most probable one is "
+            f"{likely(last)}.",
+        )
+    chosen = pick(left, last.test + 1)
+    return Decided(last.test + 1, chosen.candidate, chosen.bits, reason(chosen, left))
+
+
+def none_left(options: Sequence[Option]) -> Ended:
+    """The end where no candidate may be played."""
+    reasons = sorted({one.refused for one in options})
+    if not reasons:
+        return Ended(LIMITS, "Every test of the list is played.")
+    return Ended(LIMITS, f"No test of the list is left within the limits: {'; '.join(reasons)}.")
+
+
+def reason(chosen: Option, left: Sequence[Option]) -> str:
+    """Why a test is next, in a sentence."""
+    most = max(one.bits for one in left)
+    text = (
+        f"It is expected to tell {chosen.bits:.2g} bits about the cause and to bring the true one to "
+        f"{percent(chosen.certainty)}"
+    )
+    if chosen.bits < most:
+        return f"{text}; no test within the limits tells more than {most:.2g} bits, and this one has a smaller drift."
+    return f"{text}, the most of {len(left)} tests within the limits."
+
+
+def likely(last: Diagnosed) -> str:
+    """The most probable cause with its probability."""
+    return f"{named(last.causes[0].effects)}, with {percent(last.causes[0].probability)}"
+
+
+def named(effects: Sequence[str]) -> str:
+    """A cause in words."""
+    return " and ".join(effects) or "nothing beyond the tolerances"
+
+
+def percent(share: float) -> str:
+    """A share in per cent."""
+    return f"{100.0 * share:.3g} %"

@@ -1,0 +1,126 @@
+"""The choice of the next test, and the ends of a campaign."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from simulation.campaign import choice, information
+from simulation.campaign.goal import GoalTable
+from simulation.campaign.steps import Begun, Cause, Decided, Diagnosed, Ended, Option, Step
+
+HEAD = GoalTable(tests=4)
+OPTIONS = (
+    Option(1, 0.001, 0.0, "", 0.10, 0.7),
+    Option(2, 0.004, 0.0, "", 0.95, 0.9),
+    Option(3, 0.009, 0.0, "", 1.00, 0.9),
+    Option(4, 0.020, 0.0, "the drift would pass 0.01 m", 1.40, 0.9),
+)
+
+
+def diagnosed(**more: Any) -> Diagnosed:
+    given: dict[str, Any] = {
+        "test": 1,
+        "file": "diagnosis-01.json",
+        "version": "",
+        "status": "ambiguous",
+        "gap": 0.1,
+        "causes": (Cause(("a",), 0.6), Cause(("b",), 0.35)),
+        "same": (("a",),),
+        "together": 0.6,
+        "options": OPTIONS,
+    }
+    return Diagnosed(**(given | more))
+
+
+def following(*steps: Step, head: GoalTable = HEAD, pick: choice.Pick = choice.best) -> Decided | Ended:
+    return choice.choosing(head, pick)(steps)
+
+
+def test_the_first_test_is_the_one_with_the_smallest_drift() -> None:
+    found = following(Begun("", "", tuple(reversed(OPTIONS))))
+    assert isinstance(found, Decided)
+    assert (found.test, found.candidate) == (1, 1)
+
+
+def test_of_tests_that_tell_as_much_the_one_with_the_smallest_drift_is_next() -> None:
+    found = following(diagnosed())
+    assert isinstance(found, Decided)
+    assert (found.test, found.candidate, found.bits) == (2, 2, 0.95)
+    assert "0.95 bits" in found.why
+
+
+def test_a_test_beyond_the_limits_and_one_that_was_played_are_not_chosen() -> None:
+    found = following(Decided(1, 2, 0.0, ""), diagnosed())
+    assert isinstance(found, Decided)
+    assert found.candidate == 3
+
+
+def test_the_same_seed_draws_the_same_random_tests() -> None:
+    drawn = [following(diagnosed(), pick=partial(choice.at_random, seed)) for seed in (1, 1, 2, 3, 4)]
+    numbers = [one.candidate for one in drawn if isinstance(one, Decided)]
+    assert numbers[0] == numbers[1]
+    assert set(numbers) <= {1, 2, 3}
+    assert len(set(numbers)) > 1
+
+
+@pytest.mark.parametrize(
+    ("head", "more", "outcome", "words"),
+    [
+        (HEAD, {"causes": (Cause(("a",), 0.96),)}, "certain", "The cause is certain: a, with 96 %."),
+        (HEAD, {"causes": (Cause((), 0.96),)}, "certain", "nothing beyond the tolerances"),
+        (
+            HEAD,
+            {"same": (("a",), ("b",)), "together": 0.95},
+            "inseparable",
+            "can tell a from b; one of them is the",
+        ),
+        (GoalTable(gap=0.1), {}, "gap", "The gap that is left, 10 %, is within the 10 % asked for."),
+        (HEAD, {"test": 4}, "tests", "All 4 tests are played; the most probable cause is a, with 60 %."),
+        (HEAD, {"options": OPTIONS[3:]}, "limits", "within the limits: the drift would pass 0.01 m."),
+        (HEAD, {"options": (Option(1, 0.0, 0.0, "", 0.009, 0.6),)}, "silent", "tells more about the cause"),
+    ],
+)
+def test_each_end_is_said_by_its_name(
+    head: GoalTable, more: dict[str, Any], outcome: str, words: str
+) -> None:
+    found = following(diagnosed(**more), head=head)
+    assert isinstance(found, Ended)
+    assert found.outcome == outcome
+    assert words in found.text
+
+
+def test_when_every_test_of_the_list_is_played_the_campaign_ends() -> None:
+    found = following(Decided(1, 1, 0.0, ""), diagnosed(options=OPTIONS[:1]))
+    assert found == Ended("limits", "Every test of the list is played.")
+
+
+def test_where_nothing_may_be_played_no_first_test_is_chosen() -> None:
+    assert isinstance(following(Begun("", "", OPTIONS[3:])), Ended)
+
+
+def test_a_test_that_separates_two_causes_surely_tells_the_entropy_of_their_probabilities() -> None:
+    far = np.array([[0.0, 1e4], [1e4, 0.0]])
+    assert information.expected(np.array([0.5, 0.5]), far) == (pytest.approx(1.0), pytest.approx(1.0))
+    rare = information.expected(np.array([0.9, 0.1]), far)
+    assert rare.bits == pytest.approx(-0.9 * np.log2(0.9) - 0.1 * np.log2(0.1))
+
+
+def test_a_test_that_separates_nothing_tells_nothing() -> None:
+    found = information.expected(np.array([0.7, 0.3]), np.zeros((2, 2)))
+    assert found.bits == pytest.approx(0.0, abs=1e-12)
+    assert found.certainty == pytest.approx(0.7**2 + 0.3**2)
+
+
+def test_information_grows_with_separation_and_adds_over_parts() -> None:
+    weights = np.array([0.5, 0.3, 0.2])
+    bits = [
+        information.expected(weights, size * (1.0 - np.eye(3))).bits for size in (0.0, 1.0, 4.0, 16.0, 64.0)
+    ]
+    assert bits == sorted(bits)
+    one = information.expected(weights, 5.0 * (1.0 - np.eye(3)))
+    both = information.together([one, one])
+    assert both == (pytest.approx(2.0 * one.bits), pytest.approx(one.certainty**2))

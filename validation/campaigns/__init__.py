@@ -1,0 +1,1 @@
+"""Campaigns in hidden laboratories of the blind trial: chosen tests beside random ones."""
