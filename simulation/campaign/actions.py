@@ -23,7 +23,7 @@ from diagnosis.diagnose import diagnose
 from diagnosis.findings.report import Judged
 from diagnosis.recorded import record
 from diagnosis.recorded.slips import refuse_slips
-from simulation.campaign import assess, strain
+from simulation.campaign import assess, choice, strain
 from simulation.campaign.goal import REAL_TIME, Goal, plan_of
 from simulation.campaign.steps import Begun, Decided, Diagnosed, Endured, Interrupted, PlayedStep
 from simulation.workers.parts import synced
@@ -95,17 +95,24 @@ class CampaignActions:
         path = self._folder / f"diagnosis-{test:02d}.json"
         self._keep(path, judged)
         reports = [one.report for one in judged.values()]
-        found = {role: one.found for role, one in judged.items()}
-        self._tell("the next test", 0, 0)
-        known = assess.assessed(self._goal, found, test + 1, endured)
-        return Diagnosed(
+        known = assess.knowledge({role: one.found for role, one in judged.items()})
+        causes = known.causes()[: assess.LISTED]
+        said = Diagnosed(
             test,
             path.name,
             versions(),
-            reports[0].status if len(reports) == 1 else ", ".join(one.status for one in reports),
+            ", ".join(one.status for one in reports),
             max((part.left or 0.0 for report in reports for part in report.parts), default=0.0),
-            *known,
+            causes,
+            (causes[0].effects,),
+            causes[0].probability,
+            (),
         )
+        if choice.end(self._goal.head, said):
+            return said
+        self._tell("the next test", 0, 0)
+        more = assess.assessed(self._goal, known, test + 1, endured)
+        return replace(said, **more._asdict())
 
 
 def name(test: int) -> str:

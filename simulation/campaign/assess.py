@@ -31,9 +31,8 @@ LISTED = 8  # causes kept, the most probable ones
 
 
 class Assessment(NamedTuple):
-    """What is known, and the candidates."""
+    """What each candidate would add, and the most probable cause with those that none would tell from it."""
 
-    causes: tuple[Cause, ...]
     same: tuple[tuple[str, ...], ...]
     together: float
     options: tuple[Option, ...]
@@ -55,9 +54,13 @@ def tests(goal: Goal, test: int) -> Iterator[tuple[CampaignTest, Plan]]:
         yield one, plan_of(goal, one.number, test)
 
 
-def assessed(goal: Goal, found: Found, test: int, endured: Endured) -> Assessment:
-    """What the diagnosis of all tests so far says, and what each candidate would add as the test of this number."""
-    known = Named(found) if hypotheses.open_parts(found) or in_samples(found) else Hidden(found)
+def knowledge(found: Found) -> Named | Hidden:
+    """What the diagnosis of all tests so far says of the cause."""
+    return Named(found) if hypotheses.open_parts(found) or in_samples(found) else Hidden(found)
+
+
+def assessed(goal: Goal, known: Named | Hidden, test: int, endured: Endured) -> Assessment:
+    """What each candidate would add to what is known, as the test of this number."""
     options, apart = [], []
     for one, plan in tests(goal, test):
         rollouts = [foretold.rolled_out(plan, systems) for systems in known.plausible(plan)]
@@ -68,7 +71,7 @@ def assessed(goal: Goal, found: Found, test: int, endured: Endured) -> Assessmen
             apart += [distances] if not option.refused else []
         options.append(option)
     same, together = known.inseparable(apart)
-    return Assessment(known.causes()[:LISTED], same, together, tuple(options))
+    return Assessment(same, together, tuple(options))
 
 
 def in_samples(found: Found) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,11 +28,15 @@ from laboratories.kinds import topics as topics_of
 from loop import substructure
 from loop.closed_loop import Rollout, simulate
 from loop.signals import topics
+from models.ground_motion.motions import load
 from models.registry import Array
 from models.system import System
 from simulation.campaign import information
 from simulation.campaign.hypotheses import HiddenCauses, PartCauses, sight
 from simulation.campaign.information import Expected
+
+kept_motion = lru_cache(maxsize=64)(load)
+"""The record of a motion; the same few are scaled again and again."""
 
 
 def laboratories(found: Mapping[str, Diagnosis], plan: Plan) -> dict[str, System]:
@@ -63,8 +68,9 @@ def exchanged(found: Mapping[str, Diagnosis], part: PartCauses, fit: Fit) -> dic
 
 def rolled_out(plan: Plan, systems: Mapping[str, System]) -> Rollout:
     """The closed loop of a plan with these laboratories, without noise."""
-    master = systems[MASTER]
-    ground = substructure.ground_rows(plan, substructure.motion(plan), master.effects.time_shift)
+    master, given = systems[MASTER], plan.ground_motion
+    motion = kept_motion(given.record, plan.base, given.dt, given.unit)
+    ground = substructure.ground_rows(plan, motion, master.effects.time_shift)
     slaves = {role: systems[role] for role in plan.roles}
     return simulate(master.plan, ground, effects=master.effects, slaves=slaves)
 

@@ -94,7 +94,7 @@ class Diagnosed:
     # The most probable cause, and with it those that no candidate within the limits would tell from it.
     same: tuple[tuple[str, ...], ...]
     together: float  # probability that one of `same` is true
-    options: tuple[Option, ...]
+    options: tuple[Option, ...]  # none where the campaign ends
 
     @property
     def certainty(self) -> float:

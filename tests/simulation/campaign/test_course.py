@@ -38,6 +38,9 @@ class Killer:
         if self.left is not None and self.passed > self.left:
             raise KilledError
 
+    def told(self, _step: Step) -> None:
+        self()
+
 
 class StandIn(actions.CampaignActions):
     """Real files, with a diagnosis that grows surer with every test."""
@@ -112,7 +115,7 @@ def uninterrupted() -> tuple[bytes, int]:
     """The log of a campaign that nobody kills, and how many places it comes by."""
     with tempfile.TemporaryDirectory() as folder:
         killer, plays = Killer(), list[int]()
-        found = go(Path(folder), killer, plays, lambda _: killer())
+        found = go(Path(folder), killer, plays, killer.told)
         assert plays == [1, 2, 3]
         return found, killer.passed
 
@@ -126,7 +129,7 @@ def test_a_campaign_goes_on_from_wherever_it_was_killed(kills: list[tuple[int, f
         for after, share in kills:
             killer = Killer(after % places)
             try:
-                go(folder, killer, plays, lambda _, killer=killer: killer())
+                go(folder, killer, plays, killer.told)
             except KilledError:
                 torn(folder / log.LOG, whole, share)
         assert go(folder, Killer(), plays) == whole
