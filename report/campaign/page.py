@@ -8,7 +8,7 @@ from report.campaign import pictures, tables
 from report.page import frame, render
 from report.text.formats import percent, quantity
 from simulation.campaign.course import endured, of
-from simulation.campaign.goal import Goal
+from simulation.campaign.goal import BY_HAND, REAL_TIME, VIRTUAL, Goal
 from simulation.campaign.steps import Diagnosed, PlayedStep, Step
 
 SAID = (
@@ -16,6 +16,8 @@ SAID = (
     "Its expected information says how many bits it would add to what is known of the cause. A test may be played if "
     "under no plausible cause it passes a limit."
 )
+
+PLAYED = {VIRTUAL: "in virtual time", REAL_TIME: "in real time", BY_HAND: "by hand"}
 
 
 def page(goal: Goal, steps: Sequence[Step]) -> str:
@@ -28,7 +30,7 @@ def page(goal: Goal, steps: Sequence[Step]) -> str:
         sentences=[tables.ending(goal, steps)],
         said=SAID,
         tests=tables.overview(goal, steps),
-        files=[(one.file, f"diagnosis-{one.test:02d}.html") for one in every],
+        files=[(one.file, diagnoses(goal, one.test)) for one in every],
         probabilities=pictures.probabilities(steps) if of(steps, Diagnosed) else None,
         causes=tables.causes(steps),
         choices=list(
@@ -43,6 +45,12 @@ def page(goal: Goal, steps: Sequence[Step]) -> str:
     return frame(f"Campaign: {goal.plan.test.name}", body)
 
 
+def diagnoses(goal: Goal, test: int) -> list[str]:
+    """The pages of a test's diagnosis, one for each named slave."""
+    names = [f"-{name}" for name in goal.plan.slaves] or [""]
+    return [f"diagnosis-{test:02d}{name}.html" for name in names]
+
+
 def facts(goal: Goal, steps: Sequence[Step]) -> list[tuple[str, str]]:
     """What was asked, and what it took."""
     through, limits = endured(steps), goal.limits
@@ -50,7 +58,7 @@ def facts(goal: Goal, steps: Sequence[Step]) -> list[tuple[str, str]]:
     asked += [f"or gap below {percent(goal.head.gap)}"] if goal.head.gap else []
     return [
         ("asked", " ".join(asked)),
-        ("tests", f"{len(of(steps, PlayedStep))} of {goal.head.tests} at most, in {goal.head.mode}"),
+        ("tests", f"{len(of(steps, PlayedStep))} of {goal.head.tests} at most, {PLAYED[goal.head.mode]}"),
         ("candidates", f"{len(goal.candidates)}"),
         ("largest drift", f"{quantity(through.drift, 'm')} of {quantity(limits.drift, 'm')} at most"),
         ("absorbed", f"{quantity(through.energy, 'J')} of {quantity(limits.energy, 'J')} at most"),

@@ -68,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Go on with a campaign; 0 where its goal is reached or a person has to act, 1 where it ended otherwise."""
+    check(args)
     from simulation.campaign import goal as goals
 
     goal = goals.load(args.goal)
@@ -76,9 +77,10 @@ def run(args: argparse.Namespace) -> int:
 
         return random_tests.run(args, goal)
     played_by_hand(args, goal)
+    play = playing(args, goal)
     folder = made(args.output)
     with Progress("campaign") as progress:
-        steps = gone_on(args, goal, folder, progress)
+        steps = gone_on(args, goal, play, folder, progress)
         progress.tell("page")
         texts = written(goal, steps, folder)
     from simulation.campaign.steps import Decided, Ended, plain
@@ -103,30 +105,47 @@ def played_by_hand(args: argparse.Namespace, goal: Goal) -> None:
         )
 
 
-def made(path: Path) -> Path:
-    """The campaign's folder, created where it is not there; raises InputError where files of something else are."""
+def check(args: argparse.Namespace) -> None:
+    """Raise InputError for options that do not apply, and for a folder with files of something else."""
+    if args.compare_random is not None:
+        return
+    if args.force:
+        raise InputError(
+            "--force is for --compare-random: a campaign that is there goes on; give another folder for a new one."
+        )
+    if args.jobs != 1 or args.dask:
+        raise InputError("--jobs and --dask are for --compare-random: leave them out.")
     from simulation.campaign.log import LOG
 
+    path = args.output
+    if outputs.there(path) and not path.is_dir():
+        raise outputs.exists(path)
+    if path.is_dir() and any(path.iterdir()) and not (path / LOG).exists():
+        raise InputError(
+            f"The folder {path} is not empty and nothing in it is replaced, because it holds no campaign: give another "
+            "with -o."
+        )
+
+
+def made(path: Path) -> Path:
+    """The campaign's folder, created where it is not there."""
     try:
         path.mkdir(parents=True, exist_ok=True)
-        there = [one.name for one in path.iterdir()]
     except OSError as error:
         raise InputError(
             f"Cannot write into {path}: {error.strerror}; give another folder with -o."
         ) from None
-    if there and LOG not in there:
-        raise InputError(f"The folder {path} holds no campaign and is not empty: give another with -o.")
     return path
 
 
-def gone_on(args: argparse.Namespace, goal: Goal, folder: Path, progress: Progress) -> list[Step]:
+def gone_on(args: argparse.Namespace, goal: Goal, play: Play, folder: Path, progress: Progress) -> list[Step]:
     """The steps of the campaign after all that can be done."""
     from simulation.campaign import actions, choice, course, log
 
     with log.opened(folder) as kept:
         course.check(kept.steps, goal.digest)
         actions.tidied(folder)
-        work = actions.CampaignActions(goal, folder, playing(args, goal), keep, progress.tell)
+        work = actions.CampaignActions(goal, folder, play, keep, progress.tell)
         if args.played:
             given(args.played, kept.steps, work, folder)
         course.go_on(kept, work, choice.choosing(goal.head))
@@ -146,12 +165,14 @@ def given(recording: Path, steps: Sequence[Step], work: CampaignActions, folder:
 
 def playing(args: argparse.Namespace, goal: Goal) -> Play:
     """What plays the tests in the goal's mode."""
+    from rths.perform import run as runs
     from simulation.campaign import actions
-    from simulation.campaign.goal import BY_HAND, VIRTUAL
+    from simulation.campaign.goal import BY_HAND, VIRTUAL, plan_of
 
-    reality = goal.base / goal.head.reality if goal.head.reality else None
     if goal.head.mode == BY_HAND:
         return by_hand
+    reality = goal.base / goal.head.reality if goal.head.reality else None
+    runs.check(cli.load_reality(reality, plan_of(goal, 1, 1)))
     if goal.head.mode == VIRTUAL:
         return actions.virtually(actions.of_file(reality, goal.head.seed))
     return in_real_time(args, reality)

@@ -21,6 +21,7 @@ WRITES = {
     "predict, a page": (("default", "--found", "{plan}"), "--html"),
     "update": (("default", "--found", "{plan}"), "-o"),
     "sweep": (("{plan}",), "-o"),
+    "campaign": (("{plan}",), "-o"),
     "fragility": (("{plan}", "--quantity", "displacement", "--limit", "1"), "--html"),
     "bench": (("damper", "default"), "-o"),
     "report": (("{recording}",), "-o"),
@@ -39,7 +40,7 @@ WRITES = {
     "import": (("{plan}", "--map", "{plan}"), "-o"),
     "export": (("{recording}",), "-o"),
 }
-OF_FOLDERS = ("reproduce", "blind", "benchmark2020")
+OF_FOLDERS = ("reproduce", "blind", "benchmark2020", "campaign")
 UNREPLACED = {
     "keys": "makes files in an empty folder only",
     "doctor": "names a folder and leaves nothing in it",

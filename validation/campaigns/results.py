@@ -13,14 +13,16 @@ from report.text.formats import percent
 from simulation.campaign.goal import Goal
 from validation.campaigns.compare import ComparedCase, PlayedCampaign
 
-HALF = 0.5  # the goal: tests with chosen ones over tests with random ones
+# The goal: chosen tests over random ones, after the first test, which is the same for both.
+HALF = 0.5
 
 
 def summary(goal: Goal, cases: Sequence[ComparedCase]) -> dict[str, Any]:
     """The figures; a ratio is None where there is nothing to count.
 
-    `both`: laboratories in which all campaigns ended certain of the right cause. `all`: every laboratory in which one
-    did; a campaign that did not counts as all tests that the goal allows.
+    `both`: laboratories in which all campaigns ended certain of the right cause; `open`: those of them in which the
+    first test was not enough. `all`: every laboratory in which one campaign ended so; another one counts as all tests
+    that the goal allows.
     """
     both = [one for one in cases if one.chosen.right and all(each.right for each in one.random)]
     some = [one for one in cases if one.chosen.right or any(each.right for each in one.random)]
