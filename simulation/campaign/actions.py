@@ -82,13 +82,14 @@ class CampaignActions:
             finished(half, path)
         run = read(path)
         refuse_other(plan, run)
-        digest = hashlib.blake2b(path.read_bytes(), digest_size=8).hexdigest()
         ended = outcome(run.metadata.get("summary", {}))
-        return PlayedStep(decided.test, path.name, digest, ended, *strain.of_run(plan, run))
+        return PlayedStep(decided.test, path.name, digest_of(path), ended, *strain.of_run(plan, run))
 
     def diagnose(self, played: Sequence[PlayedStep], endured: Endured) -> Diagnosed:
         """Diagnose all tests together, the one with the largest drift first, whose gap stands out most."""
         order = sorted(played, key=lambda one: (-one.drift, one.test))
+        for one in order:
+            refuse_changed(self._folder / one.file, one.digest)
         runs = [read(self._folder / one.file) for one in order]
         test = played[-1].test
         judged = together(runs, self._goal.head.gap or None, self._tell)
@@ -135,6 +136,20 @@ def together(runs: Sequence[Run], require: float | None, tell: Tell = untold) ->
             refuse_slips(one, one.run.path)
     others = {role: [records[role] for records in more] for role in own}
     return diagnose(own, {}, tell, require, others)
+
+
+def digest_of(path: Path) -> str:
+    """Sixteen hex digits of a file."""
+    return hashlib.blake2b(path.read_bytes(), digest_size=8).hexdigest()
+
+
+def refuse_changed(path: Path, digest: str) -> None:
+    """Raise InputError where a recording is not there any more, or is another one."""
+    if not path.is_file() or digest_of(path) != digest:
+        raise InputError(
+            f"{path} is not the recording that the campaign's log has: put it back, or begin anew in another folder "
+            "with -o."
+        )
 
 
 def refuse_other(plan: Plan, run: Run) -> None:

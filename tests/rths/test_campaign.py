@@ -80,12 +80,18 @@ def test_a_campaign_that_is_killed_comes_to_the_same_end(tmp_path: Path, capsys:
         killed_at(path, folder, lines)
     assert call("campaign", path, "-o", folder) == 0
     assert f"{END}\npage: {folder / 'index.html'}\n" in capsys.readouterr().out
-    assert (folder / LOG).read_bytes() == (tmp_path / "whole" / LOG).read_bytes()
+    assert steps(folder) == steps(tmp_path / "whole")
     names = [sorted(one.name for one in each.iterdir()) for each in (folder, tmp_path / "whole")]
     assert names[0] == names[1]
     page = (folder / "index.html").read_text()
     assert END in page
     assert "hidden.toml" not in page + (folder / LOG).read_text()
+
+
+def steps(folder: Path) -> list[dict[str, Any]]:
+    """The steps of a log; recordings hold the time of day, and so have a digest of their own."""
+    found = [json.loads(line) for line in (folder / LOG).read_text().splitlines()]
+    return [{name: value for name, value in one.items() if name != "digest"} for one in found]
 
 
 def killed_at(goal: Path, folder: Path, lines: int) -> None:

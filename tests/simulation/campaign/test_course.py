@@ -165,6 +165,14 @@ def test_a_log_that_is_damaged_is_refused_with_its_line(tmp_path: Path) -> None:
         go(tmp_path, Killer(), [])
 
 
+def test_a_recording_that_was_changed_since_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "test-01.mcap").write_bytes(b"other")
+    actions.refuse_changed(tmp_path / "test-01.mcap", actions.digest_of(tmp_path / "test-01.mcap"))
+    for name in ("test-01.mcap", "test-02.mcap"):
+        with pytest.raises(InputError, match=f"{name} is not the recording that the campaign's log has"):
+            actions.refuse_changed(tmp_path / name, "0" * 16)
+
+
 def test_a_log_of_another_campaign_is_refused(tmp_path: Path) -> None:
     text = uninterrupted()[0].replace(campaign().digest.encode(), b"0" * 16, 1)
     (tmp_path / log.LOG).write_bytes(text)
