@@ -59,7 +59,7 @@ def write(path: Path, ticks: int = TICKS, *, close: bool = True, skip: range = r
         recording.abandon()
 
 
-def spots(path: Path) -> list[Spot]:
+def records_outside_chunks(path: Path) -> list[Spot]:
     """Every record outside chunks: its type, its first byte, the byte after it, and the record."""
     found: list[Spot] = []
     with path.open("rb") as stream:
@@ -78,10 +78,14 @@ def spots(path: Path) -> list[Spot]:
 def chunks_of(path: Path) -> list[tuple[bytes, set[Key]]]:
     """The bytes and the messages of every chunk of an undamaged file."""
     data = path.read_bytes()
-    return [(data[spot[1] : spot[2]], set(keys(spot[3]))) for spot in spots(path) if spot[0] == "Chunk"]
+    return [
+        (data[spot[1] : spot[2]], set(keys(spot[3])))
+        for spot in records_outside_chunks(path)
+        if spot[0] == "Chunk"
+    ]
 
 
-def whole_in(data: bytes, chunk: bytes) -> bool:
+def contains_chunk(data: bytes, chunk: bytes) -> bool:
     """Whether the data contain a chunk as it was written; its times are not compared."""
     place = data.find(chunk[TIMES.stop :]) - TIMES.stop
     return place >= 0 and data[place : place + TIMES.start] == chunk[: TIMES.start]

@@ -53,9 +53,9 @@ def chunk(data: bytes) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def hurting(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def files_that_exhaust_memory(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The files built to exhaust memory, by name; equal chunks are packed once."""
-    folder, found = tmp_path_factory.mktemp("hurting"), {}
+    folder, found = tmp_path_factory.mktemp("files_that_exhaust_memory"), {}
     for number, (name, (contents, _)) in enumerate(HURTING.items()):
         found[name] = folder / f"{number}.mcap"
         found[name].write_bytes(MAGIC + chunk(contents[0]) * len(contents))
@@ -65,12 +65,12 @@ def hurting(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("name", HURTING)
 def test_a_file_built_to_exhaust_memory_is_refused_early(
-    name: str, reader: str, hurting: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+    name: str, reader: str, files_that_exhaust_memory: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         bounds, "FREE_BYTES", MEGABYTE
     )  # the same file as with larger messages, but sooner made
-    path = hurting[name]
+    path = files_that_exhaust_memory[name]
     before = time.process_time()
     with pytest.raises(InputError, match=HURTING[name][1]) as caught:
         READERS[reader](path)

@@ -44,7 +44,7 @@ def say(**values): print(json.dumps(values))
     )
 
 
-def said(text: str) -> dict[str, Any]:
+def output_of(text: str) -> dict[str, Any]:
     done = child(text)
     assert done.returncode == 0, done.stderr
     found: dict[str, Any] = json.loads(done.stdout)
@@ -61,7 +61,7 @@ def permitted() -> None:
 
 @pytest.mark.usefixtures("permitted")
 def test_threads_and_processes_started_later_inherit_priority_and_processor() -> None:
-    found = said("""
+    found = output_of("""
 place = min(os.sched_getaffinity(0))
 granted = realtime.prepare("auto", place)
 seen = []
@@ -80,7 +80,7 @@ say(granted=granted._asdict(), place=place, seen=seen, forked=os.waitpid(pid, 0)
 
 @pytest.mark.usefixtures("permitted")
 def test_the_reset_on_fork_flag_of_the_scheduler_is_cleared() -> None:
-    found = said("""
+    found = output_of("""
 os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
 realtime.prepare("auto", None)
 say(policy=os.sched_getscheduler(0))
@@ -90,7 +90,7 @@ say(policy=os.sched_getscheduler(0))
 
 @pytest.mark.usefixtures("permitted")
 def test_a_privileged_process_gets_priority_and_processor_and_locks_its_memory() -> None:
-    found = said("""
+    found = output_of("""
 granted = realtime.prepare("auto", None)
 locked = next(line for line in open("/proc/self/status") if line.startswith("VmLck:"))
 say(granted=granted._asdict(), values=granted.values(), locked=int(locked.split()[1]))
@@ -107,7 +107,7 @@ say(granted=granted._asdict(), values=granted.values(), locked=int(locked.split(
 
 
 def test_mode_off_leaves_the_scheduling_unchanged_and_tightens_timers() -> None:
-    found = said("""
+    found = output_of("""
 before = os.sched_getaffinity(0)
 granted = realtime.prepare("off", None)
 slack = int(open("/proc/self/timerslack_ns").read())
@@ -122,7 +122,7 @@ say(granted=granted._asdict(), free=os.sched_getaffinity(0) == before, scheduler
 
 
 def test_without_privilege_mode_auto_names_what_is_missing_and_continues() -> None:
-    found = said(f"""
+    found = output_of(f"""
 {BARE}
 resource.setrlimit(resource.RLIMIT_MEMLOCK, (65536, 65536))
 before = os.sched_getaffinity(0)
@@ -148,7 +148,7 @@ def test_without_privilege_mode_on_ends_with_one_line_and_exit_code_2() -> None:
 
 
 def test_an_unlimited_memory_limit_is_enough_without_privilege() -> None:
-    found = said(f"""
+    found = output_of(f"""
 {BARE}
 realtime.raised = lambda name, wanted: -1
 sentence = realtime.lock_memory()
@@ -158,7 +158,7 @@ say(sentence=sentence)
 
 
 def test_a_resource_limit_is_raised_to_the_hard_limit_and_not_beyond() -> None:
-    found = said("""
+    found = output_of("""
 resource.setrlimit(resource.RLIMIT_NOFILE, (64, 128))
 if os.geteuid() == 0:
     os.setgroups([]); os.setuid(65534)
@@ -169,7 +169,7 @@ say(limits=limits, hard=resource.getrlimit(resource.RLIMIT_NOFILE)[1])
 
 
 def test_memory_is_not_locked_where_too_little_would_remain() -> None:
-    found = said("""
+    found = output_of("""
 realtime.spare_memory = lambda: 10_000_000
 realtime.raised = lambda name, wanted: -1
 say(sentence=realtime.lock_memory())
@@ -234,7 +234,7 @@ def test_an_unknown_real_time_mode_is_refused() -> None:
 
 
 def test_freezing_stops_the_garbage_collector() -> None:
-    found = said("""
+    found = output_of("""
 realtime.freeze()
 say(enabled=gc.isenabled(), frozen=gc.get_freeze_count(), switch=sys.getswitchinterval())
 """)

@@ -27,13 +27,13 @@ from tests.common.damaged import (
     TIMES,
     Key,
     chunks_of,
+    contains_chunk,
     damaged,
     garbage,
     keys,
     read_by_the_library,
-    spots,
+    records_outside_chunks,
     values,
-    whole_in,
     write,
 )
 
@@ -82,7 +82,7 @@ def test_a_cut_off_recording_loses_nothing_that_was_flushed(unfinished: Path, tm
 def test_a_flipped_bit_costs_one_chunk_and_its_content_is_named(
     unfinished: Path, tmp_path: Path, place: float
 ) -> None:
-    chunks = [spot for spot in spots(unfinished) if spot[0] == "Chunk"][1:]
+    chunks = [spot for spot in records_outside_chunks(unfinished) if spot[0] == "Chunk"][1:]
     _, begin, end, chunk = chunks[int(place * len(chunks))]
     broken, output = damaged(unfinished, tmp_path, lambda data: data.__setitem__(end - 7, data[end - 7] ^ 16))
     found = recover(broken, output)
@@ -101,7 +101,7 @@ def test_a_flipped_bit_costs_one_chunk_and_its_content_is_named(
 
 
 def test_losses_at_the_end_are_known_from_the_summary(whole: Path, tmp_path: Path) -> None:
-    _, _, end, chunk = [spot for spot in spots(whole) if spot[0] == "Chunk"][-1]
+    _, _, end, chunk = [spot for spot in records_outside_chunks(whole) if spot[0] == "Chunk"][-1]
     broken, output = damaged(whole, tmp_path, lambda data: data.__setitem__(end - 7, data[end - 7] ^ 16))
     found = recover(broken, output)
     gone = sorted({message[1] for message in keys(chunk)})
@@ -133,7 +133,7 @@ def test_a_recording_without_its_beginning_is_read_with_the_copies_of_its_schema
 
 
 def test_a_chunk_with_damaged_times_is_recovered_completely(unfinished: Path, tmp_path: Path) -> None:
-    _, begin, _, _ = [spot for spot in spots(unfinished) if spot[0] == "Chunk"][11]
+    _, begin, _, _ = [spot for spot in records_outside_chunks(unfinished) if spot[0] == "Chunk"][11]
     times = slice(begin + TIMES.start, begin + TIMES.stop)
     broken, output = damaged(unfinished, tmp_path, lambda data: data.__setitem__(times, garbage(16)))
     assert recover(broken, output).complete
@@ -153,7 +153,7 @@ def test_a_record_that_lost_bytes_does_not_cost_the_following_chunk(
         if seq % PER_FLUSH == PER_FLUSH - 1:
             recording.flush()
     recording.abandon()
-    records = spots(path)
+    records = records_outside_chunks(path)
     _, _, end, _ = next(
         one for one, behind in itertools.pairwise(records) if (one[0], behind[0]) == (kind, "Chunk")
     )
@@ -175,7 +175,9 @@ def test_an_event_lost_after_a_lost_index_is_counted(tmp_path: Path) -> None:
     recording.add("master", 2 * PER_FLUSH * 2_000_000, 0, values("master", 2 * PER_FLUSH, noise))
     recording.flush()
     recording.abandon()
-    (_, _, index, _), (_, begin, end, _) = [spot for spot in spots(path) if spot[0] == "Chunk"][:2]
+    (_, _, index, _), (_, begin, end, _) = [
+        spot for spot in records_outside_chunks(path) if spot[0] == "Chunk"
+    ][:2]
     assert end < begin + (begin - index)
 
     def change(data: bytearray) -> None:
@@ -188,7 +190,7 @@ def test_an_event_lost_after_a_lost_index_is_counted(tmp_path: Path) -> None:
 
 
 def test_a_flipped_bit_in_the_first_chunk_leaves_the_rest_readable(unfinished: Path, tmp_path: Path) -> None:
-    _, _, end, _ = next(spot for spot in spots(unfinished) if spot[0] == "Chunk")
+    _, _, end, _ = next(spot for spot in records_outside_chunks(unfinished) if spot[0] == "Chunk")
     broken, output = damaged(unfinished, tmp_path, lambda data: data.__setitem__(end - 7, data[end - 7] ^ 1))
     assert read(unfinished).ticks("master") == TICKS
     found = recover(broken, output)
@@ -228,7 +230,7 @@ def test_damaged_metadata_and_attachments_are_named_and_not_used(
 
 
 def test_lost_metadata_are_named(whole: Path, tmp_path: Path) -> None:
-    kind, begin, _, record = next(spot for spot in spots(whole) if spot[0] == "Metadata")
+    kind, begin, _, record = next(spot for spot in records_outside_chunks(whole) if spot[0] == "Metadata")
     assert (kind, record.name) == ("Metadata", "plan")
     broken, output = damaged(whole, tmp_path, lambda data: data.__setitem__(begin, 0x7F))
     found = recover(broken, output)
@@ -237,8 +239,8 @@ def test_lost_metadata_are_named(whole: Path, tmp_path: Path) -> None:
 
 
 def test_a_damaged_index_costs_no_data(whole: Path, tmp_path: Path) -> None:
-    indices = [spot for spot in spots(whole) if spot[0] == "MessageIndex"]
-    summary = next(spot for spot in spots(whole) if spot[0] == "Statistics")
+    indices = [spot for spot in records_outside_chunks(whole) if spot[0] == "MessageIndex"]
+    summary = next(spot for spot in records_outside_chunks(whole) if spot[0] == "Statistics")
 
     def change(data: bytearray) -> None:
         data[indices[10][1] + 5] ^= 64  # the length of one
@@ -263,7 +265,7 @@ def test_ticks_that_were_never_recorded_do_not_count_as_lost(tmp_path: Path) -> 
 def test_inserted_garbage_of_any_length_costs_only_the_chunk_that_it_hits(
     whole: Path, tmp_path: Path
 ) -> None:
-    chunks = [spot for spot in spots(whole) if spot[0] == "Chunk"]
+    chunks = [spot for spot in records_outside_chunks(whole) if spot[0] == "Chunk"]
     _, begin, end, _ = chunks[5]
     middle = (begin + end) // 2
     broken, output = damaged(
@@ -346,7 +348,7 @@ def test_all_intact_chunks_are_recovered_whatever_happens_to_a_file(
     after = broken.read_bytes()
     everything: set[Key] = set().union(*(messages for _, messages in chunks_of(original)))
     expected: set[Key] = set().union(
-        *(messages for chunk, messages in chunks_of(original) if whole_in(after, chunk))
+        *(messages for chunk, messages in chunks_of(original) if contains_chunk(after, chunk))
     )
     try:
         found = recover(broken, output)
@@ -390,6 +392,6 @@ def test_recovery_uses_far_less_memory_than_the_size_of_the_file(tmp_path: Path)
 
 def test_the_position_of_a_record_is_that_of_its_opcode(whole: Path) -> None:
     data = whole.read_bytes()
-    for kind, begin, end, _ in spots(whole):
+    for kind, begin, end, _ in records_outside_chunks(whole):
         if kind == "Chunk":
             assert HEAD.unpack_from(data, begin) == (6, end - begin - HEAD.size)

@@ -11,7 +11,7 @@ import pytest
 from common.recording.recover.recovery import recover
 from common.recording.writer import Recording
 from common.signals import TICK_TOPICS, TOPICS
-from tests.common.damaged import PER_FLUSH, RAMPS, TICKS, damaged, spots, values
+from tests.common.damaged import PER_FLUSH, RAMPS, TICKS, damaged, records_outside_chunks, values
 
 RAMP = 100  # ticks, behind those of the test
 
@@ -32,7 +32,7 @@ def with_ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def without(path: Path, folder: Path, places: slice, *, torn: bool = False) -> Any:
     """The result of recovery after some chunks were overwritten and, where `torn`, the summary was cut off."""
-    chunks = [spot for spot in spots(path) if spot[0] == "Chunk"][places]
+    chunks = [spot for spot in records_outside_chunks(path) if spot[0] == "Chunk"][places]
 
     def change(data: bytearray) -> None:
         for _, begin, end, _ in chunks:

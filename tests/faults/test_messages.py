@@ -13,7 +13,7 @@ from tests.faults.simulated import AT, LOST, Course, Scene, longest_silence, sam
 from validation.faults.wire import Conditions
 
 
-def kept(course: Course, first: int, count: int) -> float:
+def table_motion(course: Course, first: int, count: int) -> float:
     """The table's motion over ticks whose commands are lost, m; it keeps the last command."""
     return course.motion(SLAVE, first - 1, count)
 
@@ -26,7 +26,7 @@ def test_f01_one_sample_lost(tmp_path: Path) -> None:
     account, back = course.account(SLAVE), course.account(MASTER)
     assert (account.lost, account.rejected, back.lost) == (1, 0, 0)
     assert scene.route(SLAVE).ledger.numbers["lost"] == [AT]
-    motion = kept(course, AT, 1)
+    motion = table_motion(course, AT, 1)
     assert motion <= course.plan.limits.table_velocity * course.plan.test.interval
     passed(
         "F01",
@@ -48,7 +48,7 @@ def test_f02_three_samples_lost(tmp_path: Path) -> None:
     assert course.modes(MASTER) == ["running", "ramping", "idle"]  # it hears the slave, whose echo is late
     account = course.account(SLAVE)
     assert (account.lost, account.rejected) == (3, 0)
-    motion = kept(course, AT, 3)
+    motion = table_motion(course, AT, 3)
     watched = 3 * course.plan.test.interval
     assert motion <= course.plan.limits.table_velocity * watched
     since = scene.time(AT - 1)

@@ -60,9 +60,9 @@ def test_f35_a_repeated_start_a_lost_stop_and_an_early_stop(tmp_path: Path, undi
     scene = Scene(tmp_path)
     early = messages.Stop(1, 0, "too early.")
     route = scene.route(SLAVE, CONTROL)
-    scene.simulation.world.at(0, route.put, [letter_of(scene, early)])
+    scene.simulation.world.at(0, route.put, [frame_of(scene, early)])
     for tick in (-50, 0, AT):  # the start is agreed 125 ticks before the first
-        scene.at(tick, starts_again, scene)
+        scene.at(tick, replay_start, scene)
     scene.impair(scene.plan.ticks - 20, 120, LOST, SLAVE, channel=CONTROL)
     course = scene.play()
     course.calm()
@@ -95,7 +95,7 @@ def test_f35_a_repeated_start_a_lost_stop_and_an_early_stop(tmp_path: Path, undi
     )
 
 
-def letter_of(scene: Scene, message: Message) -> Any:
+def frame_of(scene: Scene, message: Message) -> Any:
     """A control message of an old session as a frame."""
     from common.protocol import codec
     from validation.faults.wire import Letter
@@ -104,7 +104,7 @@ def letter_of(scene: Scene, message: Message) -> Any:
     return Letter(codec.encode(message, key), type(message).__name__, -1, 0, "injected", intact=False)
 
 
-def starts_again(scene: Scene) -> None:
+def replay_start(scene: Scene) -> None:
     """Replays the master's own start message."""
     route = scene.route(SLAVE, CONTROL)
     route.put([one._replace(origin="replayed") for one in route.history if one.kind == "Start"])
@@ -180,7 +180,7 @@ def finish(machine: SlaveMachine | MasterMachine, state: State, stop: Message | 
     assert loop.lab.exchange.state is state
 
 
-def of_kind(kind: type[Any], role: str) -> Message:
+def message_of_kind(kind: type[Any], role: str) -> Message:
     """A message of a kind as the other laboratory of this test would send it."""
     fields: dict[str, Any] = {"session": SESSION, "lab": role, "plan": PLAN.digest()}
     fields |= {"protocol": PROTOCOL_VERSION, "instance": INSTANCE, "start_ns": 2 * 10**9, "seq": 0}
@@ -203,7 +203,7 @@ def test_f36_every_control_message_in_every_state() -> None:
                     machine = build(state)
                     commands = list(machine.probe.log.commands)
                     wanted = EXPECTED[role].get((state, kind), state) if sender == other else state
-                    message = of_kind(kind, sender)
+                    message = message_of_kind(kind, sender)
                     for _ in range(2):  # what is expected once changes nothing the second time
                         machine.give(message, sender)
                         found = machine.loop.lab.exchange.state

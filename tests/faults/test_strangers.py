@@ -26,12 +26,7 @@ from validation.faults.lab import SESSION, Surrounding
 from validation.faults.wire import INSIDER, Letter
 
 
-def from_(tick: int, **fields: float) -> Callable[[Any], Message | None]:
-    """Changes the tick's messages from a tick on."""
-    return lambda message: message._replace(**fields) if tick <= message.seq else None
-
-
-def only(tick: int, **fields: float) -> Callable[[Any], Message | None]:
+def changed_at(tick: int, **fields: float) -> Callable[[Any], Message | None]:
     """Changes the message of one tick."""
     return lambda message: message._replace(**fields) if message.seq == tick else None
 
@@ -243,7 +238,7 @@ def test_f31_f32_a_command_beyond_a_limit(
     step = 0.010 * float(np.sign(target[AT] - target[AT - 1]))
     wrong = fields or {"target": float(target[AT]) + step}
     scene = Scene(tmp_path)
-    scene.change(SLAVE, only(AT, **wrong))
+    scene.change(SLAVE, changed_at(AT, **wrong))
     course = scene.play()
     stop = course.stopped(AT, within=2, codes={"limit", "remote_trip"})
     assert course.code(SLAVE) == "limit"

@@ -35,7 +35,7 @@ def types(loop: ClosedLoop) -> str:
     return str(numba.typeof(loop))  # type: ignore[no-untyped-call]
 
 
-def of(text: str) -> Plan:
+def plan_of(text: str) -> Plan:
     return plans.parse(text, Path())
 
 
@@ -43,8 +43,8 @@ def of(text: str) -> Plan:
 def test_a_new_combination_of_kinds_needs_no_new_compiled_loop(name: str) -> None:
     plan = {
         "device": lambda: plans.load(DEVICE),
-        "table alone": lambda: of('[master]\nkind = "table"\n[slave]\nkind = "none"\n'),
-        "table, column": lambda: of('[master]\nkind = "table"\n[slave]\nkind = "column"\n'),
+        "table alone": lambda: plan_of('[master]\nkind = "table"\n[slave]\nkind = "none"\n'),
+        "table, column": lambda: plan_of('[master]\nkind = "table"\n[slave]\nkind = "column"\n'),
     }.get(name, lambda: plans.load(cli.plan_path(name)))()
     known = loop_of(plans.load(cli.plan_path("two_columns")))
     assert types(loop_of(plan)) == types(known)
@@ -58,7 +58,7 @@ def test_a_master_without_slaves_uses_the_default_tests_compiled_loop() -> None:
 
 def test_three_and_four_slaves_share_a_compiled_loop() -> None:
     three, four = (
-        of(NONE + "".join(f'[slave.{name}]\nkind = "column"\n[slave.{name}.column]\n' for name in names))
+        plan_of(NONE + "".join(f'[slave.{name}]\nkind = "column"\n[slave.{name}.column]\n' for name in names))
         for names in ("abc", "abcd")
     )
     assert types(loop_of(three)) == types(loop_of(four))

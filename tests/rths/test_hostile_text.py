@@ -65,7 +65,7 @@ def test_a_message_of_a_process_stays_on_one_line() -> None:
         {"kind": "mode", "lab": HOSTILE, "mode": HOSTILE},
     ):
         tell(Said("slave", data), progress)
-    harmless(stream.getvalue())
+    assert_harmless(stream.getvalue())
     assert stream.getvalue().count("\n") == 2
 
 
@@ -93,11 +93,11 @@ def test_links_tables_and_progress_are_escaped(capsys: Any, monkeypatch: Any) ->
         working.tell(HOSTILE)
         working.look(1e12)
     said = capsys.readouterr()
-    harmless(said.out + said.err)
+    assert_harmless(said.out + said.err)
     assert (said.out + said.err).count("\n") == 5
 
 
-def harmless(said: str) -> None:
+def assert_harmless(said: str) -> None:
     """Asserts that nothing in a text acts on a terminal and that no line of it is forged."""
     assert not ANYWHERE.search(said), said
     assert not any(line.startswith("FORGED") for line in said.split("\n")), said
@@ -177,13 +177,13 @@ def test_a_command_prints_the_text_of_a_recording_escaped(
 ) -> None:
     monkeypatch.setattr(drawing, "PICTURES", {})
     if verb == "diagnose":  # its search takes a minute and prints nothing of the recording
-        monkeypatch.setattr("rths.examine.diagnose.diagnosed", lambda *_, **__: (said_of(), None))
+        monkeypatch.setattr("rths.examine.diagnose.diagnosed", lambda *_, **__: (hostile_reports(), None))
     if verb == "identify":
         monkeypatch.setattr("report.facts.identification.identify", identified)
     call(verb, hostile, *(word.format(tmp=tmp_path, file=hostile) for word in PRINTING[verb]))
     said = capsys.readouterr()
-    harmless(said.out)
-    harmless(said.err)
+    assert_harmless(said.out)
+    assert_harmless(said.err)
     assert READABLE in said.out or verb not in SHOWN_BY
 
 
@@ -193,7 +193,7 @@ def identified(*_: Any) -> dict[str, Any]:
     return {"part": HOSTILE, "parameters": parameters, "model": HOSTILE}
 
 
-def said_of(*_: Any, **__: Any) -> dict[str, Report]:
+def hostile_reports(*_: Any, **__: Any) -> dict[str, Report]:
     """The report on a test with one slave, which has the hostile text wherever one of a recording has text."""
     gap = {"nrmse": 0.1, "noise_floor": 0.01, "peak_error": None, "unit": HOSTILE}
     report = read_report(
@@ -222,7 +222,7 @@ def test_an_error_message_contains_no_escape_sequence(
         writer.finish()  # type: ignore[no-untyped-call]
     assert call(verb, path) == 2
     said = capsys.readouterr().err
-    harmless(said)
+    assert_harmless(said)
     assert said.count("\n") == 1
     assert READABLE in said
 

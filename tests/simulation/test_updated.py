@@ -50,7 +50,7 @@ def test_an_updated_plan_contains_the_findings_it_can_express_and_lists_the_othe
     assert parse(text, tmp_path).actuator == updated.plan.actuator
 
 
-def of_one(plan: Plan, name: str, **values: float) -> FoundLaboratories:
+def findings_with(plan: Plan, name: str, **values: float) -> FoundLaboratories:
     """Findings with one effect of the catalogue."""
     held = sites.holders(plan, CATALOGUE[name].site)
     entry = {"name": name, **values} | ({"laboratory": held[0]} if held else {})
@@ -62,7 +62,7 @@ def test_every_effect_is_in_the_updated_plan_or_listed_once(name: str) -> None:
     sizes = {one.name: one.sizes[-1] if one.sizes else one.null for one in CATALOGUE[name].parameters}
     plan = short()
     updated = nominal.update(
-        of_one(plan, name, **{key: x for key, x in sizes.items() if np.isfinite(x)}), plan
+        findings_with(plan, name, **{key: x for key, x in sizes.items() if np.isfinite(x)}), plan
     )
     assert bool(updated.said) != bool(updated.unsaid)
     assert (updated.plan != plan) == bool(updated.said)
@@ -85,7 +85,7 @@ def test_every_effect_is_in_the_updated_plan_or_listed_once(name: str) -> None:
 )
 def test_an_updated_plan_with_an_effect_gives_the_same_test(name: str, values: dict[str, float]) -> None:
     plan = short(1.5, scale=0.3)
-    found = of_one(plan, name, **values)
+    found = findings_with(plan, name, **values)
     updated = nominal.update(found, plan)
     assert not updated.unsaid
     as_found, said, planned = (

@@ -14,7 +14,7 @@ def silent(_before: Mode, _turn: Turn, _after: Mode) -> None:
     pass
 
 
-def brought_to(*turns: Turn) -> Safety:
+def safety_after(*turns: Turn) -> Safety:
     safety = Safety(silent)
     for turn in turns:
         safety.take(turn)
@@ -59,7 +59,7 @@ def test_the_modes_of_a_test_follow_in_order_from_configure_to_idle() -> None:
 
 
 def test_the_first_cause_is_kept_and_its_latched_mode_follows_the_ramp() -> None:
-    safety = brought_to(Turn.CONFIGURE, Turn.ARM, Turn.RUN)
+    safety = safety_after(Turn.CONFIGURE, Turn.ARM, Turn.RUN)
     safety.trip(CAUSE)
     safety.trip(CAUSE._replace(code="watchdog"))
     safety.at_rest()
@@ -69,14 +69,14 @@ def test_the_first_cause_is_kept_and_its_latched_mode_follows_the_ramp() -> None
 
 
 def test_a_trip_during_the_ramp_after_an_orderly_end_is_latched() -> None:
-    safety = brought_to(Turn.CONFIGURE, Turn.ARM, Turn.RUN, Turn.END)
+    safety = safety_after(Turn.CONFIGURE, Turn.ARM, Turn.RUN, Turn.END)
     safety.trip(CAUSE)
     safety.at_rest()
     assert safety.mode is Mode.SAFE
 
 
 def test_only_the_reset_method_resets_and_it_clears_the_cause() -> None:
-    safety = brought_to(Turn.CONFIGURE, Turn.ARM)
+    safety = safety_after(Turn.CONFIGURE, Turn.ARM)
     safety.trip(CAUSE)
     assert safety.mode is Mode.SAFE
     with pytest.raises(LocalProtocolError):

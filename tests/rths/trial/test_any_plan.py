@@ -21,7 +21,7 @@ from laboratories.kinds import kind_of
 from loop import rigs
 from models.system import System
 from tests.helpers import ROOT
-from tests.rths.trial.test_scoring import said
+from tests.rths.trial.test_scoring import answer
 from validation.blind.cases.basis import TrialBasis, basis
 from validation.blind.cases.case import Case, Laid
 from validation.blind.draw import begin, draw
@@ -144,7 +144,7 @@ def judged(plan: str, laid: Laid, reports: Mapping[str, dict[str, Any]]) -> Outc
 
 def test_an_effect_must_be_named_in_its_own_laboratory() -> None:
     laid = Laid("column.stiffness", "column", SOFT, {"factor": 1.0}, role="slave.east", alone=True)
-    right = said("explained", "slave.east.column.stiffness", site="slave.east.column")
+    right = answer("explained", "slave.east.column.stiffness", site="slave.east.column")
     right["which"][0]["parameters"] = {
         "slave.east.column.stiffness": {"factor": {"value": 0.9, "interval": [0.8, 1.0], "unit": ""}}
     }
@@ -153,7 +153,7 @@ def test_an_effect_must_be_named_in_its_own_laboratory() -> None:
     assert outcome.laboratories == ["slave.east"]
     assert outcome.truth == ["slave.east.column.stiffness"]
     assert [one.error for one in outcome.estimates] == [0.0]
-    other = said("explained", "master.column.stiffness", site="master.column")
+    other = answer("explained", "master.column.stiffness", site="master.column")
     outcome = judged("two_columns", laid, {"east": other})
     assert not outcome.named
     assert outcome.surplus
@@ -164,8 +164,8 @@ def test_an_effect_must_be_named_in_its_own_laboratory() -> None:
 
 
 def test_with_several_slaves_the_report_on_the_one_with_the_effect_counts() -> None:
-    found = said("explained", "damper.friction", site="damper")
-    reports = {"roof": said("no_gap"), "middle": found}
+    found = answer("explained", "damper.friction", site="damper")
+    reports = {"roof": answer("no_gap"), "middle": found}
     middle, roof = (
         Laid("damper.friction", "damper", {"force": 3.0}, {"force": 0.0}, role=role, alone=True)
         for role in ("slave.middle", "slave.roof")
@@ -175,7 +175,7 @@ def test_with_several_slaves_the_report_on_the_one_with_the_effect_counts() -> N
     assert outcome.verdict == ["slave.middle.damper.friction"]
     assert judged("two_dampers", roof, reports).status == "no_gap"
     assert not judged("two_dampers", roof, reports).named
-    both = said("explained", "column.stiffness", site="column")
+    both = answer("explained", "column.stiffness", site="column")
     column = Laid("column.stiffness", "column", SOFT, {"factor": 1.0}, role=MASTER)
     assert judged("two_dampers", column, {"roof": both, "middle": both}).right
 

@@ -12,7 +12,7 @@ import pytest
 from common.recording.reader import read
 from common.signals import COLUMN_CHANNELS, Signal
 from models.registry import Array
-from tests.rths.trial.test_scoring import RUB, case, judged, said
+from tests.rths.trial.test_scoring import RUB, answer, case, judged
 from validation.blind.cases.basis import basis
 from validation.blind.draw import begin, draw
 from validation.blind.logger import logged
@@ -118,24 +118,24 @@ def test_a_relogged_recording_is_an_import_that_does_not_name_its_logger(tmp_pat
 def test_naming_an_effect_of_the_logger_does_not_count_as_a_false_name() -> None:
     lagging = "sensor.column_force.lag"
     late = replace(case("catalogue", RUB), logger="late_forces")
-    outcome = judged(late, said("explained", lagging, "damper.friction", site="damper"))
+    outcome = judged(late, answer("explained", lagging, "damper.friction", site="damper"))
     assert outcome.first
     assert outcome.surplus == 0
-    assert judged(replace(late, logger="white"), said("explained", lagging, "damper.friction")).surplus == 1
+    assert judged(replace(late, logger="white"), answer("explained", lagging, "damper.friction")).surplus == 1
     clean = replace(case("clean"), logger="late_forces")
-    assert judged(clean, said("explained", lagging)).named
-    assert judged(clean, said("no_gap")).named
-    assert not judged(clean, said("unknown_effect")).named
-    assert not judged(clean, said("explained", lagging, "column.slip")).named
-    assert not judged(replace(clean, logger="white"), said("explained", lagging)).named
+    assert judged(clean, answer("explained", lagging)).named
+    assert judged(clean, answer("no_gap")).named
+    assert not judged(clean, answer("unknown_effect")).named
+    assert not judged(clean, answer("explained", lagging, "column.slip")).named
+    assert not judged(replace(clean, logger="white"), answer("explained", lagging)).named
 
 
 def test_the_table_has_a_row_per_logger_in_their_order() -> None:
     outcomes = [
-        judged(replace(case("clean"), logger="pink"), said("no_gap")),
+        judged(replace(case("clean"), logger="pink"), answer("no_gap")),
         judged(
             replace(case("catalogue", RUB, index=1), logger="white"),
-            said("explained", "damper.friction", "column.slip", site="damper"),
+            answer("explained", "damper.friction", "column.slip", site="damper"),
         ),
     ]
     rows = case_rows(outcomes)

@@ -52,7 +52,9 @@ PLACE = {
 }
 
 
-def said(status: str, *effects: str, site: str = "", probability: float = 0.9, **more: Any) -> dict[str, Any]:
+def answer(
+    status: str, *effects: str, site: str = "", probability: float = 0.9, **more: Any
+) -> dict[str, Any]:
     report = bare(status)
     report["where"] = [PLACE | {"site": site}] if site else []
     if effects:
@@ -80,7 +82,7 @@ def judged(what: Case, report: dict[str, Any], *sizes: float, seconds: float = 2
 
 
 def test_the_true_effect_at_its_site_is_right() -> None:
-    outcome = judged(case("catalogue", RUB), said("explained", "damper.friction", site="damper"))
+    outcome = judged(case("catalogue", RUB), answer("explained", "damper.friction", site="damper"))
     assert outcome.right
     assert outcome.named
     assert outcome.located
@@ -90,7 +92,7 @@ def test_the_true_effect_at_its_site_is_right() -> None:
 
 
 def test_another_effect_is_wrong_and_the_reason_is_given() -> None:
-    outcome = judged(case("catalogue", RUB), said("explained", "column.slip", site="column"), 1.0)
+    outcome = judged(case("catalogue", RUB), answer("explained", "column.slip", site="column"), 1.0)
     assert not outcome.right
     assert outcome.surplus
     assert outcome.why == (
@@ -99,7 +101,7 @@ def test_another_effect_is_wrong_and_the_reason_is_given() -> None:
 
 
 def test_an_effect_does_not_count_as_named_if_the_status_denies_it() -> None:
-    outcome = judged(case("catalogue", RUB), said("no_gap", "damper.friction", site="damper"))
+    outcome = judged(case("catalogue", RUB), answer("no_gap", "damper.friction", site="damper"))
     assert not outcome.named
     assert outcome.verdict == []
     assert math.isnan(outcome.probability)
@@ -107,7 +109,7 @@ def test_an_effect_does_not_count_as_named_if_the_status_denies_it() -> None:
 
 def test_a_set_of_equivalents_counts_for_effect_and_site() -> None:
     twin = "sensor.column_force.gain"
-    report = said("ambiguous", twin, site="sensor.column_force", equivalent=[["column.stiffness", twin]])
+    report = answer("ambiguous", twin, site="sensor.column_force", equivalent=[["column.stiffness", twin]])
     assert judged(case("catalogue", SOFT), report).right
     report["equivalent"] = []
     assert not judged(case("catalogue", SOFT), report).right
@@ -116,35 +118,35 @@ def test_a_set_of_equivalents_counts_for_effect_and_site() -> None:
 
 
 def test_both_effects_of_a_pair_must_be_in_the_verdict() -> None:
-    both = said("explained", "damper.friction", "column.slip", site="column")
+    both = answer("explained", "damper.friction", "column.slip", site="column")
     assert judged(case("pair", RUB, SLIP), both, 5.0, 3.0).right
     assert judged(case("pair", RUB, SLIP), both, 5.0, 3.0).size == 3.0
-    one = judged(case("pair", RUB, SLIP), said("explained", "damper.friction", site="damper"))
+    one = judged(case("pair", RUB, SLIP), answer("explained", "damper.friction", site="damper"))
     assert not one.right
     assert one.why == "reports damper.friction, not damper.friction and column.slip"
 
 
 def test_a_clean_laboratory_has_no_gap() -> None:
-    assert judged(case("clean"), said("no_gap")).right
-    alarm = judged(case("clean"), said("explained", "column.slip", site="column"))
+    assert judged(case("clean"), answer("no_gap")).right
+    alarm = judged(case("clean"), answer("explained", "column.slip", site="column"))
     assert not alarm.right
     assert alarm.surplus
     assert alarm.why == "reports column.slip, not no_gap"
 
 
 def test_an_effect_within_the_tolerances_may_be_reported_as_no_gap() -> None:
-    assert judged(case("catalogue", SOFT, inside=True), said("no_gap")).right
-    assert not judged(case("catalogue", SOFT, inside=True), said("no_gap")).visible
-    assert not judged(case("catalogue", SOFT), said("no_gap")).right
+    assert judged(case("catalogue", SOFT, inside=True), answer("no_gap")).right
+    assert not judged(case("catalogue", SOFT, inside=True), answer("no_gap")).visible
+    assert not judged(case("catalogue", SOFT), answer("no_gap")).right
 
 
 def test_an_unknown_effect_is_right_if_reported_as_unknown_at_its_site() -> None:
-    assert judged(case("unknown", CABLE), said("unknown_effect", site="damper")).right
+    assert judged(case("unknown", CABLE), answer("unknown_effect", site="damper")).right
     assert judged(
-        case("unknown", CABLE), said("partly_explained", "damper.friction", site="damper", probability=0.3)
+        case("unknown", CABLE), answer("partly_explained", "damper.friction", site="damper", probability=0.3)
     ).right
-    assert not judged(case("unknown", CABLE), said("unknown_effect", site="column")).right
-    assert not judged(case("unknown", CABLE), said("explained", "damper.friction", site="damper")).right
+    assert not judged(case("unknown", CABLE), answer("unknown_effect", site="column")).right
+    assert not judged(case("unknown", CABLE), answer("explained", "damper.friction", site="damper")).right
 
 
 def test_a_diagnosis_that_fails_is_wrong() -> None:
@@ -156,7 +158,7 @@ def test_a_diagnosis_that_fails_is_wrong() -> None:
 
 
 def test_a_parameter_is_judged_relative_to_its_distance_from_the_null_value() -> None:
-    report = said("explained", "column.stiffness", site="column")
+    report = answer("explained", "column.stiffness", site="column")
     report["which"][0]["parameters"] = {"column.stiffness": {"factor": value(0.91, 0.9, 0.92)}}
     (one,) = judged(case("catalogue", SOFT), report).estimates
     assert one.error == pytest.approx(0.1)
@@ -168,15 +170,15 @@ def test_a_parameter_is_judged_relative_to_its_distance_from_the_null_value() ->
 
 def some() -> list[Outcome]:
     far = bare("explained")["how_far"] | {"closed": 0.97}
-    good = said("explained", "damper.friction", site="damper", probability=1.0, how_far=far)
+    good = answer("explained", "damper.friction", site="damper", probability=1.0, how_far=far)
     good["which"][0]["parameters"] = {"damper.friction": {"force": value(3.03, 2.9, 3.1)}}
     return [
         *(judged(case("catalogue", RUB, index=i), good) for i in range(19)),
-        judged(case("formula", SLIP, index=19), said("unknown_effect", site="column")),
-        judged(case("catalogue", SOFT, index=20), said("no_gap"), 0.3),
-        judged(case("pair", RUB, SLIP, index=21), said("explained", "column.slip", site="column")),
-        judged(case("clean", index=22), said("no_gap")),
-        judged(case("unknown", CABLE, index=23), said("unknown_effect", site="damper"), seconds=9.0),
+        judged(case("formula", SLIP, index=19), answer("unknown_effect", site="column")),
+        judged(case("catalogue", SOFT, index=20), answer("no_gap"), 0.3),
+        judged(case("pair", RUB, SLIP, index=21), answer("explained", "column.slip", site="column")),
+        judged(case("clean", index=22), answer("no_gap")),
+        judged(case("unknown", CABLE, index=23), answer("unknown_effect", site="damper"), seconds=9.0),
     ]
 
 

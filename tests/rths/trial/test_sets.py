@@ -17,7 +17,7 @@ from common.reality import reality as realities
 from diagnosis.report import read as read_report
 from tests import opensees
 from tests.rths.diagnosis_report.pieces import bare
-from tests.rths.trial.test_scoring import CABLE, RUB, SOFT, case, judged, said
+from tests.rths.trial.test_scoring import CABLE, RUB, SOFT, answer, case, judged
 from validation.blind import oracle
 from validation.blind.best import best_closed
 from validation.blind.cases.basis import TrialBasis, basis
@@ -115,8 +115,8 @@ def test_every_material_gives_a_force(name: str) -> None:
 def test_a_material_is_named_by_its_mechanism() -> None:
     steel = Laid("opensees.Steel02", "column", {"d": 1e-3, "b": 0.05}, {}, role="master")
     hidden = case("material", steel)
-    assert judged(hidden, said("explained", "column.yielding", site="column")).right
-    wrong = judged(hidden, said("explained", "column.stiffness", site="column"))
+    assert judged(hidden, answer("explained", "column.yielding", site="column")).right
+    wrong = judged(hidden, answer("explained", "column.stiffness", site="column"))
     assert [row.name for row in case_rows([wrong])] == ["opensees.Steel02", "all cases"]
     assert not wrong.named
     assert wrong.surplus == 1
@@ -124,16 +124,16 @@ def test_a_material_is_named_by_its_mechanism() -> None:
 
 def test_partly_explained_counts_for_an_unknown_effect_only_without_a_certain_name() -> None:
     hidden = case("unknown", CABLE)
-    assert judged(hidden, said("unknown_effect", site="damper")).right
-    assert judged(hidden, said("partly_explained", "damper.friction", site="damper", probability=0.3)).right
-    assert not judged(hidden, said("partly_explained", "damper.friction", site="damper")).named
+    assert judged(hidden, answer("unknown_effect", site="damper")).right
+    assert judged(hidden, answer("partly_explained", "damper.friction", site="damper", probability=0.3)).right
+    assert not judged(hidden, answer("partly_explained", "damper.friction", site="damper")).named
 
 
 def test_only_the_visible_ones_of_many_effects_have_to_be_named() -> None:
     hidden = case("many", RUB, SOFT)
-    found = judged(hidden, said("explained", "damper.friction", site="damper"), 5.0, 0.5)
+    found = judged(hidden, answer("explained", "damper.friction", site="damper"), 5.0, 0.5)
     assert (found.named, found.asked, found.listed) == (True, 1, 1)
-    found = judged(hidden, said("explained", "damper.friction", site="damper"), 5.0, 3.0)
+    found = judged(hidden, answer("explained", "damper.friction", site="damper"), 5.0, 3.0)
     assert (found.named, found.asked, found.listed) == (False, 2, 1)
 
 
