@@ -87,7 +87,7 @@ def through(plan: Plan, tmp_path_factory: pytest.TempPathFactory) -> Run:
     return read(path)
 
 
-def test_the_test_goes_on_from_where_it_was_held(plan: Plan, held: Run, through: Run) -> None:
+def test_a_held_test_resumes_where_it_was_held(plan: Plan, held: Run, through: Run) -> None:
     found = holds(held.events, plan.test.interval)
     assert found == (Hold(BEGUN, RAMP, RESUMED),)
     for topic in ("master", "slave", "latency"):
@@ -101,7 +101,7 @@ def test_the_test_goes_on_from_where_it_was_held(plan: Plan, held: Run, through:
         assert np.abs(gap).max() < most * np.abs(expected).max(), name
 
 
-def test_while_it_is_held_nothing_is_commanded_to_move(held: Run) -> None:
+def test_during_a_hold_no_motion_is_commanded(held: Run) -> None:
     still = slice(BEGUN + RAMP + 1, RESUMED)
     master, slave = held.columns["master"], held.columns["slave"]
     for columns, names in (
@@ -115,7 +115,9 @@ def test_while_it_is_held_nothing_is_commanded_to_move(held: Run) -> None:
     assert np.ptp(slave["table_displacement"][RESUMED - 100 : RESUMED]) < 1e-4
 
 
-def test_the_ramps_stay_within_the_accelerations_of_the_plan(plan: Plan, held: Run, through: Run) -> None:
+def test_the_ramps_of_a_hold_stay_within_the_planned_accelerations(
+    plan: Plan, held: Run, through: Run
+) -> None:
     for name in ("column_target", "table_target"):
         speed = np.abs(np.diff(through.columns["master"][name])).max() / plan.test.interval
         peaks = [
@@ -125,7 +127,9 @@ def test_the_ramps_stay_within_the_accelerations_of_the_plan(plan: Plan, held: R
         assert peaks[0] <= peaks[1] + 1.5 * speed / (RAMP * plan.test.interval), name
 
 
-def test_the_recording_is_whole_and_says_when_it_was_held(plan: Plan, held: Run) -> None:
+def test_the_recording_of_a_held_test_is_complete_and_states_the_time_of_the_hold(
+    plan: Plan, held: Run
+) -> None:
     ticks = plan.ticks + RESUMED - BEGUN
     assert held.metadata["summary"]["ticks_expected"] == str(ticks)
     assert set(due(held, plan).values()) == {ticks}
@@ -145,7 +149,7 @@ def test_the_recording_is_whole_and_says_when_it_was_held(plan: Plan, held: Run)
     assert codes.count("operator") == 2  # the repetitions did nothing
 
 
-def test_the_replay_reproduces_it_to_the_last_bit(held: Run) -> None:
+def test_the_replay_reproduces_a_held_test_to_the_last_bit(held: Run) -> None:
     chosen = planned(held)
     matches = replay_master(held, chosen) | replay_slaves(held, chosen)
     assert "master/actuator_command" in matches
@@ -153,14 +157,14 @@ def test_the_replay_reproduces_it_to_the_last_bit(held: Run) -> None:
     assert all(match.differing == 0 and match.compared > 0 for match in matches.values())
 
 
-def test_the_diagnosis_judges_what_lies_before_the_hold(held: Run) -> None:
+def test_the_diagnosis_judges_the_ticks_before_the_hold(held: Run) -> None:
     built = recorded.build(held)
     assert built.ticks == BEGUN
     assert built.held == BEGUN * built.plan.test.interval
     assert built.signals["displacement"].shape[0] == BEGUN
 
 
-def test_a_comparison_goes_up_to_the_hold_and_says_so(held: Run, through: Run) -> None:
+def test_a_comparison_ends_at_the_hold_and_states_this(held: Run, through: Run) -> None:
     found = source.recorded(held)
     assert found.ticks.tolist() == list(range(BEGUN))
     assert found.motion.endswith("; held at 0.600 s, and compared up to there")
@@ -169,7 +173,7 @@ def test_a_comparison_goes_up_to_the_hold_and_says_so(held: Run, through: Run) -
     assert stood is None
 
 
-def test_several_slaves_and_several_holds(tmp_path: Path) -> None:
+def test_a_test_with_several_slaves_may_be_held_several_times(tmp_path: Path) -> None:
     tables = {
         "test": {"name": "tall", "duration": 1.8},
         "structure": {"mass": [1.6e5] * 3, "stiffness": [9e7] * 3, "damping": [4e5] * 3},
@@ -199,7 +203,7 @@ def test_several_slaves_and_several_holds(tmp_path: Path) -> None:
         ({500: "hold"}, ["nearly over"]),
     ],
 )
-def test_orders_in_the_wrong_state_are_refused_with_a_sentence(
+def test_orders_in_the_wrong_state_are_refused_in_one_sentence(
     orders: dict[int, str], sentences: list[str], default_plan: Plan
 ) -> None:
     plan = without_recorder(plans.with_test(default_plan, duration=1.6))
@@ -211,7 +215,7 @@ def test_orders_in_the_wrong_state_are_refused_with_a_sentence(
         assert sentence in answer.text
 
 
-def test_a_motion_that_is_too_fast_is_not_held_and_the_reason_is_a_limit_of_the_plan(
+def test_a_hold_is_refused_during_too_fast_a_motion_and_the_limit_is_named(
     default_plan: Plan,
 ) -> None:
     tables = default_plan.tables() | {"limits": {"damper_stroke": 0.1}}
@@ -265,7 +269,7 @@ def test_no_message_makes_a_test_longer_than_a_hold_can(plan: Plan) -> None:
         assert slave.lab.until == until
 
 
-def test_a_building_of_another_program_says_why_it_is_not_held() -> None:
+def test_a_test_with_another_programs_building_refuses_a_hold_with_the_reason() -> None:
     from master.building import BuildingStep
 
     assert BuildingStep.time is None

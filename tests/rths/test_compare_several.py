@@ -119,7 +119,7 @@ def test_signals_and_units_are_chosen_on_the_page_with_the_keyboard(
         assert float(cells[1]) == pytest.approx(np.abs(of["ground_acceleration"]).max() / 9.80665, rel=1e-3)
 
 
-def test_the_extremes_that_a_page_holds_lose_no_peak() -> None:
+def test_the_thinned_histories_of_a_page_keep_every_peak() -> None:
     time = np.arange(1000) * 0.002
     values = np.sin(7.0 * time)
     values[437] = 3.0
@@ -130,7 +130,7 @@ def test_the_extremes_that_a_page_holds_lose_no_peak() -> None:
     assert np.nanmin(found) == values.min()
 
 
-def test_what_a_recording_lacks_leaves_its_columns_empty() -> None:
+def test_signals_that_a_recording_lacks_leave_their_columns_empty() -> None:
     values = np.array([0.5, np.nan, -1.0, np.nan])
     found = choice.extremes(np.arange(4.0), values, 8.0, 8)
     assert np.flatnonzero(np.isfinite(found[:, 0])).tolist() == [0, 2]
@@ -139,7 +139,7 @@ def test_what_a_recording_lacks_leaves_its_columns_empty() -> None:
     assert whole[1].tolist() == [choice.NONE, choice.NONE]
 
 
-def test_the_histories_of_a_page_are_bounded_however_many_there_are(three: list[Path]) -> None:
+def test_the_size_of_a_pages_histories_is_bounded_for_any_number_of_them(three: list[Path]) -> None:
     found = runs.several(three)[:1] * runs.MOST
     offered = choice.offered(found, runs.chosen(found, []))
     held = sum(len(one) for signal in offered["signals"] for one in signal["histories"])

@@ -228,7 +228,7 @@ def held_code(folder: Path, name: str) -> int:
     return main()
 
 
-def test_a_test_and_its_prediction_stand_over_each_other_on_a_page_and_beside_each_other_in_a_file(
+def test_a_test_and_its_prediction_are_overlaid_on_a_page_and_in_columns_of_a_file(
     folder: Path, found: Prediction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     test, next_ = folder / "over.mcap", folder / "over_next.mcap"
@@ -252,7 +252,7 @@ def test_a_test_and_its_prediction_stand_over_each_other_on_a_page_and_beside_ea
     assert main() == 2  # the files are there
 
 
-def test_what_was_measured_is_drawn_from_the_recording_and_not_from_the_prediction(
+def test_measured_signals_are_drawn_from_the_recording_and_not_from_the_prediction(
     folder: Path, found: Prediction
 ) -> None:
     test, next_ = folder / "drawn.mcap", folder / "drawn_next.mcap"

@@ -175,9 +175,7 @@ def test_two_browsers_see_each_others_orders_and_a_page_of_an_ended_panel_gives_
     panels.end()
 
 
-def test_a_stop_that_was_pressed_while_the_link_was_cut_arrives_once_when_it_is_back(
-    panels: Panels, short_plan: Plan
-) -> None:
+def test_a_stop_pressed_during_an_outage_arrives_once_after_it(panels: Panels, short_plan: Plan) -> None:
     labs = StandIn(with_test(short_plan, seed=9))
     with labs.there(), open_page(panels.start()) as page:
         page.wait(LINKED, HANG_S)
@@ -193,7 +191,7 @@ def test_a_stop_that_was_pressed_while_the_link_was_cut_arrives_once_when_it_is_
     panels.end()
 
 
-def test_a_whole_test_is_operated_from_the_page_and_outlives_its_panel(panels: Panels) -> None:
+def test_a_complete_test_is_operated_from_the_page_and_continues_without_its_panel(panels: Panels) -> None:
     (panels.folder / "plan.toml").write_text(f"[test]\nname = 'operated'\nduration = 300.0\n{PATIENT}")
     with open_page(panels.start("plan.toml")) as page:
         press(page, "check")

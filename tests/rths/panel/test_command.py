@@ -29,7 +29,7 @@ from rths.perform import panel
         (["start"], "No test runs on this machine"),
     ],
 )
-def test_a_mistake_is_one_sentence(
+def test_a_mistake_gives_one_sentence(
     words: list[str], sentence: str, call: Any, capsys: Any, monkeypatch: Any, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("RTHS_RUNNING", str(tmp_path))
@@ -59,7 +59,7 @@ class Served:
     ("options", "token"),
     [((), False), (("--token",), True), (("--host", "lab.example"), True), (("--host", "localhost"), False)],
 )
-def test_whoever_is_not_on_this_machine_needs_the_token_that_is_printed(
+def test_users_of_other_machines_need_the_printed_token(
     options: tuple[str, ...], token: bool, call: Any, capsys: Any, monkeypatch: Any, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("RTHS_RUNNING", str(tmp_path))

@@ -158,7 +158,7 @@ def test_the_largest_value_of_the_last_second_follows_a_decaying_motion(watched:
     assert stroke.lately < stroke.most
 
 
-def test_a_held_test_is_said_to_be_held_until_it_goes_on(watched: Watched) -> None:
+def test_a_held_test_is_shown_as_held_until_it_resumes(watched: Watched) -> None:
     watched.tell(master="running", slave="running")
     event = {"lab": "master", "t": 1.0, "level": "info", "text": "", "values": {}}
     for code, said in (("hold", "slowing down to a hold"), ("held", "held"), ("resumed", "running")):
