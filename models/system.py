@@ -31,6 +31,7 @@ class ColumnEffects:
     hardening: float = 0.0
     exponent: float = 2.0  # sharpness of the transition: Bouc-Wen's n, Menegotto and Pinto's R₀
     law: float = 0.0  # index of the law of yielding in `laboratories.column.specimen.LAWS`
+    turn: float = 0.0  # reversal over the yield displacement below which Menegotto and Pinto's branch goes on
     unloading: float = 0.0  # exponent of the unloading stiffness, of a peak-oriented or pinched specimen
     first_bend: float = 1.0  # of a trilinear or pinched specimen, over the yield displacement
     second_stiffness: float = 0.5  # between the bends, over the first
@@ -107,7 +108,7 @@ class DamperEffects:
 
 @dataclass(frozen=True)
 class SensorEffects:
-    """Effects on a sensor: `gain·delayed(lagged(value)) + bias + drift·t`, plus noise, then rounded to the step."""
+    """Effects on a sensor: `saturated(gain·delayed(lagged(value))) + bias + drift·t + noise`, rounded to the step."""
 
     gain: float = 1.0
     bias: float = 0.0
@@ -116,6 +117,8 @@ class SensorEffects:
     quantization: float = 0.0
     noise: float = 0.0  # rms, in addition to the plan's
     delay: float = 0.0  # s
+    saturation: float = math.inf  # level that no reading exceeds, bias aside
+    saturation_sharpness: float = 2.0  # n of x/(1 + |x/level|ⁿ)^(1/n)
 
 
 @dataclass(frozen=True)

@@ -128,7 +128,7 @@ def yielding(stiffness: float, effects: ColumnEffects) -> Array:
     if name == "bouc_wen":
         return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.5, 0.5])
     if name == "menegotto_pinto":
-        return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.925, 0.15])
+        return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.925, 0.15, effects.turn])
     if name == "clough":  # which has no negative hardening
         return np.array([stiffness, limit, max(effects.hardening, 0.0), effects.unloading, 0.0, 0.0])
     if name == "trilinear":

@@ -53,6 +53,9 @@ class Law:
     renamed: Mapping[str, str] = field(
         default_factory=dict
     )  # the model's names of parameters where they differ
+    fixed: Mapping[str, float] = field(
+        default_factory=dict
+    )  # its parameters of shape that a fit leaves as they are
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,8 @@ class Effect:
     def under(self, place: int, values: Mapping[str, float]) -> dict[str, float]:
         """Parameters for the formula `laws[place]`, with the shapes from which its fit starts."""
         kept = {item.name: values[item.name] for item in self.parameters}
-        return kept | dict(self.laws[place].shapes) | ({"law": float(place)} if place else {})
+        law = self.laws[place]
+        return kept | dict(law.shapes) | dict(law.fixed) | ({"law": float(place)} if place else {})
 
     @property
     def family(self) -> str:

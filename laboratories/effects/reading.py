@@ -1,4 +1,4 @@
-"""Effects on readings: each exists once per signal and sets one field of `models.system.SensorEffects`.
+"""Effects on readings: each exists once per signal and sets fields of `models.system.SensorEffects`.
 
 Their sizes are shares of a signal's typical magnitude on the default test, or multiples of the default plan's noise.
 """
@@ -6,8 +6,8 @@ Their sizes are shares of a signal's typical magnitude on the default test, or m
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 
 from laboratories.effects.effect import Effect, Parameter
@@ -40,7 +40,7 @@ QUIET = (
 
 @dataclass(frozen=True)
 class ReadingFault:
-    """An error that any reading can have: the effects `sensor.<signal>.<name>` with one parameter each."""
+    """An error that any reading can have: the effects `sensor.<signal>.<name>` with one parameter of strength each."""
 
     name: str  # the field of `SensorEffects` that the parameter sets
     parameter: Callable[[SensorSignal], Parameter]  # the parameter for a signal, with its unit and sizes
@@ -48,17 +48,21 @@ class ReadingFault:
     reference: str  # a source or an equation
     in_samples: bool = False  # as in `Effect`
     random: bool = False  # as in `Effect`
+    # parameters of shape, by the field of `SensorEffects` that each sets
+    shapes: Mapping[str, Parameter] = field(default_factory=dict)
 
     def on(self, name: str, signal: SensorSignal) -> Effect:
         """The effect on the reading of that name."""
+        strength = self.parameter(signal)
+        fields = {strength.name: self.name} | {item.name: place for place, item in self.shapes.items()}
         return Effect(
             name=f"sensor.{name}.{self.name}",
             site=f"sensor.{name}",
             kind="measurement",
             says=self.says,
-            parameters=(self.parameter(signal),),
+            parameters=(strength, *self.shapes.values()),
             reference=self.reference,
-            apply=partial(falsified, signal=name, fault=self.name),
+            apply=partial(falsified, signal=name, fields=fields),
             signal=name,
             fault=self.name,
             in_samples=self.in_samples,
@@ -78,9 +82,16 @@ def sized(size: float, *shares: float) -> tuple[float, ...]:
     return tuple(float(f"{share * size:.6g}") for share in shares)
 
 
-def falsified(system: System, *, signal: str, fault: str, **parameter: float) -> System:
-    """The system with the one parameter of an effect on a reading set; unchanged at the parameter's null value."""
-    (value,) = parameter.values()
-    changed = system.sensed(signal, **{fault: value})
-    before = system.effects.sensors.get(signal, SensorEffects())
+def falsified(system: System, *, signal: str, fields: Mapping[str, str], **given: float) -> System:
+    """The system with an effect on a reading set; unchanged at the null value of its first parameter.
+
+    `fields` are those of `SensorEffects` that the parameters set, by their names, the first parameter's first.
+    """
+    untouched = SensorEffects()
+    values = {place: given.get(name, getattr(untouched, place)) for name, place in fields.items()}
+    fault = next(iter(values))
+    if values[fault] == getattr(untouched, fault):
+        values = {place: getattr(untouched, place) for place in values}
+    changed = system.sensed(signal, **values)
+    before = system.effects.sensors.get(signal, untouched)
     return system if changed.effects.sensors[signal] == before else changed

@@ -1,11 +1,13 @@
-"""The reading of a value: `gain·delayed(lagged(value)) + bias + drift·t + noise`, rounded to the sensor's step.
+"""The reading of a value: `saturated(gain·delayed(lagged(value))) + bias + drift·t + noise`, rounded to the step.
 
-The lag is of first order, `τ·ẏ + y = x`. Values are linear between ticks, for the lag and for a delay by any part of an
-interval, and zero before the first tick. Without effects a reading equals exactly value plus noise.
+The lag is of first order, `τ·ẏ + y = x`; `saturated(x) = x/(1 + |x/L|ⁿ)^(1/n)`, with the level L. Values are linear
+between ticks, for the lag and for a delay by any part of an interval, and zero before the first tick. Without effects a
+reading equals exactly value plus noise.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -16,7 +18,7 @@ from models.registry import Array
 from models.system import SensorEffects
 from models.transfer_systems import first_order
 
-PRESENT, GAIN, BIAS, DRIFT, QUANTUM, FADE, EARLY, LATE, DELAY = range(9)
+PRESENT, GAIN, BIAS, DRIFT, QUANTUM, FADE, EARLY, LATE, DELAY, LEVEL, SHARPNESS = range(11)
 # from KEPT on a ring of the values kept for a delay; NEWEST is its newest place
 LAGGED, PREVIOUS, NEWEST, KEPT = range(4)
 
@@ -24,20 +26,21 @@ LAGGED, PREVIOUS, NEWEST, KEPT = range(4)
 class Readings(NamedTuple):
     """One laboratory's sensors with their memory, which `step` updates."""
 
-    params: Array  # (signals, 9)
+    params: Array  # (signals, 11)
     state: Array  # (signals, 3 and as many as the longest delay needs)
 
 
 def build(interval: float, names: Sequence[str], sensors: Mapping[str, SensorEffects]) -> Readings:
     """Sensors at rest, one row per name."""
-    params = np.zeros((len(names), 9))
+    params = np.zeros((len(names), 11))
     for place, name in enumerate(names):
         more = sensors.get(name, SensorEffects())
         if more == SensorEffects():
             continue
         row = first_order.propagators(1.0, more.lag, np.array([interval]))[0]
         steady = (more.gain, more.bias, more.drift, more.quantization)
-        params[place] = (1.0, *steady, *row, more.delay / interval)
+        level = more.saturation if math.isfinite(more.saturation) else 0.0
+        params[place] = (1.0, *steady, *row, more.delay / interval, level, more.saturation_sharpness)
     longest = float(np.max(params[:, DELAY], initial=0.0))
     return Readings(params, np.zeros((len(names), KEPT + (int(longest) + 2 if longest > 0.0 else 0))))
 
@@ -67,6 +70,15 @@ def delayed(sensors: Readings, place: int, value: float) -> float:
 
 
 @jit
+def saturated(value: float, level: float, sharpness: float) -> float:
+    """`x/(1 + |x/L|ⁿ)^(1/n)`, without a power that could overflow."""
+    share = abs(value) / level
+    if share <= 1.0:
+        return float(value / (1.0 + share**sharpness) ** (1.0 / sharpness))
+    return float(np.copysign(level * (1.0 + share ** (-sharpness)) ** (-1.0 / sharpness), value))
+
+
+@jit
 def step(sensors: Readings, place: int, value: float, noise: float, t: float) -> float:
     """The reading of signal `place` at time `t` (s); updates its state by one tick."""
     params, state = sensors.params, sensors.state
@@ -79,12 +91,10 @@ def step(sensors: Readings, place: int, value: float, noise: float, t: float) ->
     )
     state[place, LAGGED] = lagged
     state[place, PREVIOUS] = value
-    result = (
-        params[place, GAIN] * delayed(sensors, place, lagged)
-        + params[place, BIAS]
-        + params[place, DRIFT] * t
-        + noise
-    )
+    read = params[place, GAIN] * delayed(sensors, place, lagged)
+    if params[place, LEVEL] > 0.0:
+        read = saturated(read, params[place, LEVEL], params[place, SHARPNESS])
+    result = read + params[place, BIAS] + params[place, DRIFT] * t + noise
     quantum = params[place, QUANTUM]
     if quantum > 0.0:
         result = quantum * np.floor(result / quantum + 0.5)

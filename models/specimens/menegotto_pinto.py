@@ -10,7 +10,8 @@ M. Menegotto and P. E. Pinto, IABSE Symposium Lisbon (1973), 15-22; F. C. Filipp
 Effects of bond deterioration on hysteretic behavior of reinforced concrete joints, UCB/EERC-83/19 (1983).
 
 A branch begins at every reversal, however small, as the authors have it: a small unloading and reloading forgets the
-branch before and overshoots it. Not to be confused with the smooth law of Bouc and Wen, whose loop is not sharper
+branch before and overshoots it. With a least turn the branch goes on through smaller reversals, back and forth, as
+noise in a motion makes them. Not to be confused with the smooth law of Bouc and Wen, whose loop is not sharper
 after the first yielding than later.
 """
 
@@ -34,6 +35,7 @@ class MenegottoPintoParams(NamedTuple):
     sharpness: float = 20.0  # R₀
     loss: float = 0.925  # c₁, share of the sharpness that large excursions take
     loss_at: float = 0.15  # c₂, excursion over δ_y at which half of that is lost
+    least_turn: float = 0.0  # reversal over δ_y below which the branch goes on
 
 
 RULES = {
@@ -43,17 +45,20 @@ RULES = {
     "sharpness": Rule("sharpness of the first yielding", least=1.0, most=100.0),
     "loss": Rule("share of the sharpness that large excursions take", least=0.0, most=0.99),
     "loss_at": Rule("excursion over the yield deformation at which half of that is lost", above=0.0),
+    "least_turn": Rule(
+        "reversal over the yield deformation below which a branch goes on", least=0.0, most=0.1
+    ),
 }
-STIFFNESS, YIELD_DISPLACEMENT, HARDENING, SHARPNESS, LOSS, LOSS_AT = range(6)
+STIFFNESS, YIELD_DISPLACEMENT, HARDENING, SHARPNESS, LOSS, LOSS_AT, LEAST_TURN = range(7)
 
-# of the last call: δ (m), f (N), way (±1, 0 before any motion); start and aim of the branch, R; both peaks (m)
+# farthest on the branch: δ (m), f (N), way (±1, 0 before any motion); start and aim of the branch, R; both peaks (m)
 DEFORMATION, FORCE, WAY, START, START_FORCE, AIM, AIM_FORCE, BENT, TOP, BOTTOM = range(10)
 STATE_SIZE = 10
 
 
 @jit
 def turn(p: Array, s: Array, way: float) -> None:
-    """Begin a branch at the last deformation and force, towards `way`."""
+    """Begin a branch at the farthest deformation and force of the one before, towards `way`."""
     k, limit, b = p[STIFFNESS], p[YIELD_DISPLACEMENT], p[HARDENING]
     s[START] = s[DEFORMATION]
     s[START_FORCE] = s[FORCE]
@@ -78,15 +83,15 @@ def bent(share: float, sharpness: float) -> float:
 
 @jit
 def step(p: Array, s: Array, deformation: float) -> float:
-    """Force (N) at a deformation (m) reached from that of the last call; `s` (10,) moves on."""
+    """Force (N) at a deformation (m) reached from those of the calls before; `s` (10,) moves on."""
     moved = deformation - s[DEFORMATION]
     if moved == 0.0:
         return s[FORCE]
     way = 1.0 if moved > 0.0 else -1.0
-    if way != s[WAY]:
+    if way != s[WAY] and (s[WAY] == 0.0 or abs(moved) > p[LEAST_TURN] * p[YIELD_DISPLACEMENT]):
         turn(p, s, way)
     length = s[AIM] - s[START]
-    if length * way <= 0.0:  # the reversal lies beyond the line of hardening already
+    if length * s[WAY] <= 0.0:  # the reversal lies beyond the line of hardening already
         force = s[START_FORCE] + p[HARDENING] * p[STIFFNESS] * (deformation - s[START])
     else:
         share = (deformation - s[START]) / length
@@ -94,6 +99,7 @@ def step(p: Array, s: Array, deformation: float) -> float:
         force = s[START_FORCE] + (p[HARDENING] * share + (1.0 - p[HARDENING]) * curved) * (
             s[AIM_FORCE] - s[START_FORCE]
         )
-    s[DEFORMATION] = deformation
-    s[FORCE] = force
+    if way == s[WAY]:
+        s[DEFORMATION] = deformation
+        s[FORCE] = force
     return force

@@ -20,7 +20,9 @@ ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth
     ("table.gain", {"factor": 0.93}, {"factor": 0.01}),
     ("damper.friction", {"force": 3.0}, {"force": 0.05}),
     ("damper.viscous", {"factor": 1.5}, {"factor": 0.05}),
+    ("column.hardening", {"share": -0.05}, {"share": 0.1}),
     ("sensor.column_displacement.gain", {"factor": 1.08}, {"factor": 0.02}),
+    ("sensor.column_force.saturation", {"limit": 5e4}, {"limit": 0.1}),
 ]
 
 

@@ -153,6 +153,14 @@ def test_quantisation_errors_agree_with_widrows_model() -> None:
     assert abs(error.mean()) < 4.0 * error.std() / math.sqrt(values.size)
 
 
+@pytest.mark.parametrize("sharpness", [1.0, 2.0, 20.0])
+def test_a_reading_saturates_at_its_limit_and_reads_small_values_as_they_are(sharpness: float) -> None:
+    values = np.array([-1e9, -30.0, -1e-6, 0.0, 1e-6, 30.0, 1e9])
+    got = read(values, SensorEffects(saturation=30.0, saturation_sharpness=sharpness, bias=5.0)) - 5.0
+    half = 30.0 / 2.0 ** (1.0 / sharpness)
+    assert got == pytest.approx([-30.0, -half, -1e-6, 0.0, 1e-6, half, 30.0], rel=1e-5, abs=1e-12)
+
+
 @pytest.mark.parametrize("name", [*COLUMN.channels.names, *TABLE.channels.names])
 def test_noise_levels_add_as_independent_noises(name: str) -> None:
     kind = COLUMN if name in COLUMN.channels.names else TABLE

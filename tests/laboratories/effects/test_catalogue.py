@@ -75,7 +75,7 @@ ROWS = {  # parameters and their units, as users write them in a reality
     "damper.stroke_stop": {"stroke": "m", "stiffness": "N/m"},
     "damper.offset": {"force": "N"},
 }
-FAULTS = ("gain", "bias", "drift", "lag", "delay", "quantization", "noise")
+FAULTS = ("gain", "bias", "drift", "lag", "delay", "quantization", "noise", "saturation")
 for signal, unit in SIGNALS.items():
     ROWS |= {
         f"sensor.{signal}.gain": {"factor": ""},
@@ -85,6 +85,7 @@ for signal, unit in SIGNALS.items():
         f"sensor.{signal}.delay": {"delay": "s"},
         f"sensor.{signal}.quantization": {"step": unit},
         f"sensor.{signal}.noise": {"rms": unit},
+        f"sensor.{signal}.saturation": {"limit": unit, "sharpness": ""},
     }
 EACH = pytest.mark.parametrize("effect", DISTINCT.values(), ids=list(DISTINCT))
 

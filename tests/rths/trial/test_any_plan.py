@@ -126,7 +126,7 @@ def test_a_laboratory_of_a_users_kind_runs_its_own_kernel_unless_it_has_an_effec
         ("x.device.ripple", {"amplitude": 1e-3, "frequency": 8.0}, True),
         ("x.device.cam", {"amplitude": 1e-4, "period": 0.02}, True),
         ("x.device.hardening", {"stiffness": 1e9}, False),
-        ("x.sensor.piston_force.saturation", {"limit": 2e5}, False),
+        ("sensor.piston_force.saturation", {"limit": 2e5}, False),
         ("sensor.piston_force.lag", {"time_constant": 0.005}, False),
     ):
         change = np.ptp(played(name, **parameters) - clean, axis=0)

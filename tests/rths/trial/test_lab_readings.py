@@ -36,7 +36,7 @@ def test_readings_are_falsified_independently(signal: str) -> None:
             {"step": 0.05 * size},
             0.05 * size * np.floor(clean / (0.05 * size) + 0.5),
         ),
-        f"x.sensor.{signal}.saturation": ({"limit": size}, size * np.tanh(clean / size)),
+        f"sensor.{signal}.saturation": ({"limit": size}, size * np.tanh(clean / size)),
     }
     for name, (parameters, values) in wanted.items():
         found = play(effect(name, "", **parameters))

@@ -36,6 +36,7 @@ FORMULAS: dict[str, tuple[str, ...]] = {
     "damper.force_limit": ("smooth",),
     "damper.stroke_stop": ("hertz", "linear"),
     **{f"sensor.{signal}.lag": ("butterworth",) for signal in SIGNALS},
+    **{f"sensor.{signal}.saturation": ("tanh",) for signal in SIGNALS},
 }
 """Formulas by effect of the catalogue, where they differ from the catalogue's."""
 
@@ -72,8 +73,6 @@ UNCATALOGUED: dict[str, tuple[str, tuple[str, ...], tuple[tuple[float, float], .
     "x.damper.motor_constant": ("damper", ("rise",), ((0.02, 0.3),)),
     "x.damper.cubic_spring": ("damper", ("stiffness",), ((5e3, 8e4),)),
     "x.damper.appendage": ("damper", ("mass", "frequency"), ((0.15, 2.0), (8.0, 2.5))),
-    "x.sensor.column_force.saturation": ("sensor.column_force", ("limit",), ((2e5, 4e4),)),
-    "x.sensor.table_acceleration.saturation": ("sensor.table_acceleration", ("limit",), ((4.0, 1.2),)),
     "x.sensor.table_acceleration.crosstalk": (
         "sensor.table_acceleration",
         ("coefficient",),

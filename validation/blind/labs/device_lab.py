@@ -52,7 +52,8 @@ AROUND = {
 
 def formulas(channels: Channels) -> dict[str, tuple[str, ...]]:
     """Formulas by effect of the catalogue on the readings of a device, where they differ from the catalogue's."""
-    return {f"sensor.{name}.lag": ("butterworth",) for name in channels.names}
+    found: dict[str, tuple[str, ...]] = {f"sensor.{name}.lag": ("butterworth",) for name in channels.names}
+    return found | {f"sensor.{name}.saturation": ("tanh",) for name in channels.names}
 
 
 def uncatalogued(
@@ -70,7 +71,6 @@ def uncatalogued(
         "hardening": {"stiffness": (1.4e-2 * stiffness, 0.18 * stiffness)},
     }
     read = {
-        f"x.sensor.{channels.force}.saturation": {"limit": (6.7 * force, 1.3 * force)},
         f"x.sensor.{channels.force}.missing": {"probability": (0.01, 0.3)},
     }
     return {f"x.device.{name}": ("device", ranges) for name, ranges in found.items()} | {

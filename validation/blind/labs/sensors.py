@@ -24,7 +24,14 @@ def true_values(names: Sequence[str], levels: Mapping[str, float]) -> Values:
     values: Values = {}
     for name in names:
         perfect = {"noise": levels[name], "gain": 1.0, "bias": 0.0, "drift": 0.0, "step": 0.0}
-        perfect |= {"saturation": 0.0, "missing": 0.0, "lag": 0.0, "order": 0.0, "crosstalk": 0.0}
+        perfect |= {
+            "saturation": 0.0,
+            "sharpness": 1.0,
+            "missing": 0.0,
+            "lag": 0.0,
+            "order": 0.0,
+            "crosstalk": 0.0,
+        }
         values |= {f"{name}.{key}": value for key, value in perfect.items()}
     return values
 
@@ -59,9 +66,9 @@ def noise(values: Values, *, signal: str, rms: float) -> None:
     values[f"{signal}.noise"] = math.hypot(values[f"{signal}.noise"], rms)
 
 
-def saturation(values: Values, *, signal: str, limit: float) -> None:
-    """Reading = limit·tanh(value/limit)."""
-    values[f"{signal}.saturation"] = limit
+def saturation(values: Values, *, signal: str, limit: float, sharpness: float = 1.0) -> None:
+    """Reading = ±limit·tanh(|value/limit|ⁿ)^(1/n), n = sharpness."""
+    values |= {f"{signal}.saturation": limit, f"{signal}.sharpness": sharpness}
 
 
 def missing(values: Values, *, signal: str, probability: float) -> None:
@@ -75,7 +82,7 @@ def crosstalk(values: Values, *, signal: str, coefficient: float) -> None:
 
 
 FALSIFIED: tuple[Callable[..., None], ...] = (gain, bias, drift, quantization, noise)
-OUTSIDE: tuple[Callable[..., None], ...] = (saturation, missing, crosstalk)
+OUTSIDE: tuple[Callable[..., None], ...] = (missing, crosstalk)
 
 
 def known(names: Sequence[str]) -> dict[str, KnownEffect]:
@@ -85,9 +92,17 @@ def known(names: Sequence[str]) -> dict[str, KnownEffect]:
         for effect in FALSIFIED:
             result[f"sensor.{name}.{effect.__name__}"] = KnownEffect(partial(effect, signal=name), PLAIN)
         result[f"sensor.{name}.lag"] = KnownEffect(partial(lag, signal=name), LAGS, f"{name}.order")
+        blunt = KnownEffect(partial(saturation, signal=name), {"tanh": 0})
+        result[f"sensor.{name}.saturation"] = blunt
         for effect in OUTSIDE:
             result[f"x.sensor.{name}.{effect.__name__}"] = KnownEffect(partial(effect, signal=name), PLAIN)
     return result
+
+
+def blunted(value: float, limit: float, sharpness: float) -> float:
+    """A value as a saturating sensor reads it."""
+    share = math.tanh((abs(value) / limit) ** sharpness) ** (1.0 / sharpness)
+    return math.copysign(limit * share, value)
 
 
 @dataclass
@@ -103,7 +118,7 @@ class TrueSensor:
         v = self.values
         result = v["gain"] * (value + v["crosstalk"] * leak)
         if v["saturation"] > 0.0:
-            result = v["saturation"] * math.tanh(result / v["saturation"])
+            result = blunted(result, v["saturation"], v["sharpness"])
         result += v["bias"] + v["drift"] * t + error
         if v["step"] > 0.0:
             result = v["step"] * math.floor(result / v["step"] + 0.5)

@@ -6,7 +6,7 @@ with yield displacement δ_y, hardening α and exponent n. The parameter `law` c
 `models/specimens` holds:
 
     1   bilinear
-    2   Menegotto and Pinto, with R₀ as the exponent
+    2   Menegotto and Pinto, with R₀ as the exponent; reversals below `turn` times yield_displacement begin no branch
     3   peak-oriented (Clough and Johnston); `unloading` is the exponent of its unloading stiffness
     4   trilinear
     5   pinched; its reloading stiffness decreases with every cycle by `damage`
@@ -28,6 +28,9 @@ from laboratories.effects.effect import Law, Parameter
 from laboratories.effects.laws import sets
 
 SKELETON = {"first_bend": 0.5, "second_stiffness": 0.5}
+# Of the yield displacement. Between two ticks the noise of a command turns the motion by this much, in the laboratory
+# at other times than in the replay; Menegotto and Pinto's law forgets a branch at every turn, a specimen does not.
+TURN = 3e-4
 RELOADING = {"pinch_force": 0.5, "pinch_displacement": 0.5, "unloading": 0.2, "damage": 0.01}
 
 
@@ -92,6 +95,16 @@ EFFECT = sets(
             says="exponent of the unloading stiffness of laws 3 and 5 to 10",
             shape=True,
         ),
+        "turn": Parameter(
+            "turn",
+            "",
+            null=0.0,
+            least=0.0,
+            most=0.1,
+            sizes=(),
+            says="reversal over yield_displacement below which a branch of law 2 goes on",
+            shape=True,
+        ),
         "first_bend": share(
             "first_bend",
             1.0,
@@ -135,6 +148,7 @@ EFFECT = sets(
             {"hardening": 0.05, "exponent": 15.0},
             "menegotto_pinto",
             {"exponent": "sharpness"},
+            {"turn": TURN},
         ),
         Law("peak-oriented", {"hardening": 0.05, "unloading": 0.3}, "clough"),
         Law("trilinear", {"hardening": 0.05, **SKELETON}, "trilinear"),
