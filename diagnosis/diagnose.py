@@ -34,9 +34,10 @@ from models.system import System
 SHORTEST = 0.5
 BUILDING = ("ground_acceleration", "displacement")
 UNNAMED = ("partly", "unknown")  # outcomes of a part in which some of the gap has no named cause
-# Noise of a balance of forces over that of the forces used, from which on it is a logger's: a wrong mass leaves less.
+# Ratio of the noise in a balance of forces to that of the forces used, from which on a logger caused it.
+# A wrong mass gives a smaller ratio.
 OTHERS = 0.7
-# Share of a balance's rms below which what it has at the highest frequencies is the motion's own, not noise.
+# Share of a balance's rms below which its content at the highest frequencies belongs to the motion.
 SMOOTH = 1e-5
 # Correlation of a reading with its prediction below which its sign is doubted. It is that of two sines 135° apart,
 # which no delay of a stable test reaches: the compensated loop is unstable long before.
@@ -146,7 +147,7 @@ def judged(data: Data, scales: Scales, logged: Data | None = None) -> PartVerdic
 
 
 def own_noise(data: Data) -> bool:
-    """Whether the balance of a building's forces has noise that its motion, and so the forces used, had not."""
+    """Whether the balance of a building's forces has noise that its motion, and so the forces used, did not have."""
     used = residuals.noise(data.part.measured)
     least = SMOOTH * np.sqrt(np.mean(np.square(data.part.measured), axis=0))
     return bool(np.any(data.white > np.maximum(OTHERS * used, least)))

@@ -90,7 +90,7 @@ def unknowns(found: Diagnosis) -> tuple[Unknown, ...]:
 
 
 def described(found: Diagnosis, search: Search) -> Unknown:
-    """Description of what the chosen effects leave in one part."""
+    """Description of the residual that the chosen effects leave in one part."""
     data = search.data
     place = worst(search, search.chosen)
     residual = data.residual(hypothesis.lay(data, search.chosen.z, search.chosen.values))[:, place]

@@ -82,7 +82,7 @@ def details(
 
 
 def facts(record: Record) -> TestFacts:
-    """What was tested."""
+    """Facts of the test."""
     summary = record.run.metadata.get("summary", {})
     motion = record.run.metadata.get("ground_motion", {})
     return TestFacts(
@@ -109,7 +109,7 @@ def laboratory(lab: RecordedLaboratory) -> LaboratorySeen:
 
 
 def remains(found: Diagnosis, far: Response) -> Remaining:
-    """What the verdict leaves, overall and at which sites."""
+    """The gap that the verdict leaves, overall and by site."""
     left = ((item.search, remaining(item.search.chosen)) for item in found.verdicts)
     return Remaining(
         overall=far.how_far.after,

@@ -20,7 +20,7 @@ QUIET = 0.2  # noise over a signal's rms from which on a gap relative to that rm
 
 
 def held_out(record: Record) -> Mask:
-    """Ticks that no fit has seen."""
+    """Ticks that no fit has used."""
     return residuals.withheld_ticks(record.ticks, record.plan.test.interval)
 
 

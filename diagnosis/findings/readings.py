@@ -18,11 +18,11 @@ LOUDER, LEAST = 2.5, 2.0
 # Noise over a reading's peak that a logger's converter makes: 12 bits of a range five times the peak, whose steps are
 # hidden once the reading is interpolated.
 CONVERTER = 7e-4
-# Share of the planned noise that the others make expected at least, so that a quiet set does not alarm.
+# Least expected noise as a share of the planned one, so that a quiet set of sensors gives no alarm.
 QUIETEST = 0.4
 # Relative error, 95 % of the noise levels found in white noise: 2.3 % in 40 s at 2 ms, 3.5 % in 10 s.
 NOISE_ERROR = 0.03
-# Share of the planned noise, the least that is believed of all sensors together: below it none has noise.
+# Least common noise of all sensors as a share of the planned one: below it they count as free of noise.
 LEAST_SCALE = 1e-3
 # Share of repeated samples from which on a sensor misses samples (two equal samples of normal noise are impossible in
 # double precision), and from which on the signal stood still instead.

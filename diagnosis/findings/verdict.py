@@ -208,7 +208,7 @@ def certainty(search: Search) -> float:
 
 
 def strain(search: Search) -> float:
-    """Share of belief that is left to effects beside which the nominal parameters are as far off as they are."""
+    """Factor on the probability of effects, which falls as the nominal parameters beside them move further off."""
     z = search.chosen.z
     usual = z.size + STRAINED * math.sqrt(2.0 * z.size)
     return math.exp(-max(search.chosen.prior - usual, 0.0) / (2.0 * TEMPERATURE))

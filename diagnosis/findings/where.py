@@ -20,7 +20,9 @@ from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
 from models.registry import Array
 
-CLEAR = 2.0  # force over its noise that a motion would make, from which on its absence blames the displacement sensor
+CLEAR = (
+    2.0  # force of a motion over its noise from which on a missing force points to the displacement sensor
+)
 OWN_MOTION = 0.5  # Hz, above which an acceleration is integrated twice: below, sensor drift would dominate
 UNSEEN = 0.5  # motion over the noise of the displacement sensor below which that sensor cannot show it
 # A window belongs to a trace from this share of the trace's largest window on, but never above the second, so that the

@@ -1,1 +1,1 @@
-"""What no effect explains, learned at its site as a force or a displacement over state and history."""
+"""Residuals that no effect explains, learned at their site as a force or a displacement over state and history."""

@@ -1,4 +1,4 @@
-"""What a machine does beyond its model, as a series over its own motion: a force or a displacement.
+"""The difference of a machine from its model as a series over its own motion: a force or a displacement.
 
 Each series comes from the recorded signals at the machine itself, so that errors of other machines do not enter.
 """
@@ -39,7 +39,7 @@ class Equation:
     over: Literal[
         "piston displacement", "deformation", "table displacement", "velocity"
     ]  # abscissa of its curve
-    quantity: str  # what `left` is, in words
+    quantity: str  # a text on the quantity in `left`
     unit: str
 
 

@@ -1,1 +1,1 @@
-"""What a prediction takes from a diagnosis: the laboratories as they were found, and how far that may be wrong."""
+"""The input of a prediction from a diagnosis: the laboratories as found, and the uncertainty of the findings."""

@@ -1,4 +1,4 @@
-"""What was found as a reality: nominal parameters as they were moved, effects, and what was learned of the rest."""
+"""The findings as a reality: fitted nominal parameters, effects, and the laws learned from the rest."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class FoundReality(NamedTuple):
 
 
 def as_reality(found: Mapping[str, Diagnosis]) -> FoundReality:
-    """The reality that diagnoses of one test, by role of the slave, amount to; the master's laboratory is the first's.
+    """The reality that follows from the diagnoses of one test, by slave; the master's laboratory is the first's.
 
     Raises:
-        InputError: no reality can say it, because a slave without a name shares the master's tables.
+        InputError: no reality can express it, because a slave without a name shares the master's tables.
     """
     first = next(iter(found.values()))
     plan = first.record.plans[MASTER]
@@ -59,7 +59,7 @@ def moved(found: Diagnosis, role: str) -> Plan:
 
 
 def changed(planned: Tables, real: Tables, names: tuple[str, ...]) -> Tables:
-    """What differs in some tables; of a table within one too."""
+    """The differences between some tables, nested tables included."""
     result: Tables = {}
     for name in names:
         before, after = planned.get(name, {}), real.get(name, {})

@@ -21,12 +21,12 @@ from diagnosis.signals.mask import Mask
 from models.registry import Array
 
 COVERED = 0.9  # share of the time that the band of a prediction is to hold
-NORMAL = 1.645  # standard deviations on both sides within which a normal deviate is that often
+NORMAL = 1.645  # standard deviations on both sides that contain this share of a normal distribution
 HALVINGS = 40  # of the interval in which a share is searched: to a part in 10¹²
 LARGEST = 10.0  # share of a signal's envelope beyond which nothing is predicted at all
-# Share of the energy of a target's motion that may lie below, and above, the band that counts as seen.
+# Share of the energy of a target's motion that may lie below, and above, the band that counts as observed.
 TAIL = 0.005
-LOUD = 5.0  # largest value over a reading's noise from which on it says how far a laboratory moved
+LOUD = 5.0  # least ratio of peak to noise at which a reading shows how far a laboratory moved
 
 
 class PartSpread(NamedTuple):
@@ -37,7 +37,7 @@ class PartSpread(NamedTuple):
 
 
 def spread(found: Mapping[str, Diagnosis]) -> Spread:
-    """What the diagnoses of one test, by role of the slave, know of the errors of what they found."""
+    """The uncertainties of the findings in the diagnoses of one test, by role of the slave."""
     parts = [
         part_spread(item, verdict)
         for place, (role, item) in enumerate(found.items())
