@@ -12,6 +12,7 @@ from common.recording.run import Run
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
 from report.facts.laboratories import LaboratoryFacts, laboratories, whole_plan
 from report.facts.late import said_beside_client
+from report.text import holds
 from report.text.force_path import sentence as force_sentence
 from report.text.formats import apart, milliseconds, quantity
 
@@ -73,6 +74,7 @@ def sentences(run: Run, summary: Summary) -> list[str]:
     found = [
         outcome(summary),
         *summary["warnings"],
+        *holds.sentences(summary["holds"]),
         completeness(summary),
         *exchange(summary),
         rejected(summary),

@@ -11,6 +11,7 @@ from common.recording.outcome import COMPLETED, CUT_OFF, outcome
 from common.terminal import cli
 from common.terminal.printable import all_shown
 from report.facts.late import said_beside_client
+from report.text import holds
 from report.text.formats import apart, fixed, milliseconds, modes, reading, storey_rows, tracked
 from report.text.progress import Progress
 from report.text.terminal import table
@@ -109,13 +110,8 @@ def write_completeness(summary: dict[str, Any]) -> None:
     """Ticks expected, recorded and missing."""
     if text := stopped(summary):
         sys.stdout.write(f"{text}\n")
-    for hold in summary["holds"]:
-        lasted = (
-            "until the end" if hold["duration"] is None else f"for {hold['duration']:.3f} s with its ramps"
-        )
-        sys.stdout.write(
-            f"held at t {hold['t']:.3f} s, with the earthquake's time at {hold['earthquake_time']:.3f} s, {lasted}\n"
-        )
+    for sentence in holds.sentences(summary["holds"]):
+        sys.stdout.write(f"{sentence}\n")
     rows = [["topic", "expected", "recorded", "missing", "holes"]]
     for topic, facts in summary["topics"].items():
         holes = " ".join(f"{first}–{last}" for first, last in facts["holes"]) or "none"

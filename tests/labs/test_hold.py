@@ -24,6 +24,7 @@ from common.signals import OF_STOREYS
 from diagnosis.recorded import record as recorded
 from report.facts.due import due
 from report.facts.summary import summarize
+from report.run import verdict
 from rths.examine.replay import planned, replay_master, replay_slaves
 from simulation import source, virtual
 from simulation.virtual import VirtualTest
@@ -139,6 +140,11 @@ def test_the_recording_of_a_held_test_is_complete_and_states_the_time_of_the_hol
     assert told["t"] == BEGUN * plan.test.interval
     assert told["earthquake_time"] == pytest.approx((BEGUN + RAMP / 2) * plan.test.interval)
     assert told["duration"] == (RESUMED - BEGUN + RAMP) * plan.test.interval
+    said = verdict.sentences(held, summary)
+    assert (
+        "The test was held at t 0.600 s for 1.028 s with its ramps; the earthquake's time stood still at 0.714 s."
+        in said
+    )
     codes = [event["code"] for event in held.events if event["lab"] == "master"]
     assert [code for code in codes if code in ("hold", "held", "resume", "resumed")] == [
         "hold",
