@@ -11,14 +11,16 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.opensees import safe
+from benchmarks.opensees.urgent import HANG_S, allowed, said
 from benchmarks.result import BenchmarkFigure, cost_figure, rate_figure
 from benchmarks.whole_test import ROOT
-from common.host.realtime import PRIORITY
 from common.opensees.process import INTERPRETER
 from common.plan.read import parse
 from common.recording.reader import read
@@ -31,8 +33,6 @@ MOST_LATE = 0.05  # percentage points beyond the bare timing loop, or bare TCP
 STEPS, PACED, REPEATS = 5000, 3000, 3
 QUICK_STEPS = 200
 INTERVAL = 0.002
-URGENT = PRIORITY - 1  # of the client, below that of the server
-HANG_S = 200.0
 PORT = "PORT"  # stands for it in a command line
 PLAN = """
 [test]
@@ -57,7 +57,10 @@ def run(*, quick: bool = False) -> list[BenchmarkFigure]:
         place = Path(folder)
         (place / "served.toml").write_text(PLAN)
         found = [*fastest(place, steps, repeats), *in_real_time(place, paced, repeats)]
-        return found if quick else [*found, *with_an_ordinary_client(place, paced, repeats)]
+        if quick:
+            return found
+        ordinary = with_an_ordinary_client(place, paced, repeats)
+        return [*found, *ordinary, *safe.run(place, partial(with_tables, place), repeats)]
 
 
 def fastest(folder: Path, steps: int, repeats: int) -> Iterator[BenchmarkFigure]:
@@ -86,12 +89,8 @@ def fastest(folder: Path, steps: int, repeats: int) -> Iterator[BenchmarkFigure]
 
 def rate(words: Sequence[str], priority: int = 0) -> list[float]:
     """Steps per second that a client says, none where it says nothing; `priority` is its real-time one, if any."""
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
-        if priority:
-            os.sched_setscheduler(process.pid, os.SCHED_FIFO, os.sched_param(priority))
-        said, _ = process.communicate(timeout=HANG_S)
-    lines = [line for line in said.splitlines() if line.startswith("{")]
-    return [float(json.loads(lines[-1])["rate"])] if lines else []
+    line = said(words, priority)
+    return [float(json.loads(line)["rate"])] if line else []
 
 
 class Paced(NamedTuple):
@@ -110,7 +109,7 @@ def in_real_time(folder: Path, steps: int, repeats: int) -> Iterator[BenchmarkFi
 
     Otherwise other processes of the machine, which keep an ordinary client from its processor, would decide.
     """
-    priority = URGENT if realtime_allowed() else 0
+    priority = allowed()
     yield from judged(*in_turn(folder, steps, repeats, priority), granted=bool(priority))
 
 
@@ -120,17 +119,6 @@ def with_an_ordinary_client(folder: Path, steps: int, repeats: int) -> Iterator[
     for name, found in (("rths serve", ours), ("bare TCP", bare)):
         title = f"{name} every 2 ms, late displacements of an ordinary client"
         yield cost_figure(title, "%", [one.client_late for one in found])
-
-
-def realtime_allowed() -> bool:
-    """Whether this process may give another one real-time priority."""
-    try:
-        before = os.sched_getscheduler(0), os.sched_getparam(0)
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(URGENT))
-        os.sched_setscheduler(0, *before)
-    except (PermissionError, AttributeError):  # no right, or not on this system
-        return False
-    return True
 
 
 def in_turn(folder: Path, steps: int, repeats: int, priority: int) -> tuple[list[Paced], list[Paced]]:
@@ -202,6 +190,14 @@ def alone(steps: int, priority: int) -> Paced:
     found = json.loads(said)
     ticks = len(found["waits"]) + found["late"]
     return Paced(float(np.median(found["waits"])) * 1e6, 100.0 * found["late"] / ticks)
+
+
+@contextlib.contextmanager
+def with_tables(folder: Path, tables: str) -> Iterator[int]:
+    """`rths serve` in real time of the plan with further tables."""
+    (folder / "served.toml").write_text(PLAN + tables)
+    with served(folder, "--beside") as port:
+        yield port
 
 
 @contextlib.contextmanager

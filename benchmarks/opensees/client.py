@@ -48,19 +48,23 @@ def answer(link: socket.socket) -> float:
     return float(struct.unpack_from("=d", data)[0])
 
 
+def make_step(link: socket.socket, x: float, t: float) -> None:
+    """One step to a displacement (m) at a time (s)."""
+    say(link, TRIAL, x, t)
+    for code in (DAMPING, FORCE, DAMPING):
+        say(link, code, x, t)
+        answer(link)
+    say(link, TRIAL, x, t)
+    say(link, COMMIT, x, t)
+
+
 def main() -> int:
     """Make the steps, and print how many a second."""
     port, steps = int(sys.argv[1]), int(sys.argv[2])
     link = connected(port)
     began = 0.0
     for i in range(1, steps + 1):
-        x, t = 1e-3 * math.sin(0.02 * i), STEP * i
-        say(link, TRIAL, x, t)
-        for code in (DAMPING, FORCE, DAMPING):
-            say(link, code, x, t)
-            answer(link)
-        say(link, TRIAL, x, t)
-        say(link, COMMIT, x, t)
+        make_step(link, 1e-3 * math.sin(0.02 * i), STEP * i)
         began = began or time.perf_counter()  # the first step waits until the laboratories are armed
     sys.stdout.write(f'{{"rate": {(steps - 1) / (time.perf_counter() - began)}}}\n')
     say(link, END, 0.0, 0.0)
