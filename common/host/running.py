@@ -37,6 +37,7 @@ class Running(NamedTuple):
     plan: str
     role: str = RUN  # `run`, or that of a laboratory that was started by itself
     recording: str = ""  # its file, empty for a laboratory that was started by itself
+    since: float = 0.0  # Unix time of its registration, s, which a reader takes from the file
 
 
 class Neighbour(NamedTuple):
@@ -95,7 +96,7 @@ def by_process() -> dict[int, Running]:
             if one is None or one.user != os.getuid():
                 continue
             entry = Running(**json.loads(path.read_text(encoding="utf-8")))
-            entries.append((one.since, one.process, entry))
+            entries.append((one.since, one.process, entry._replace(since=one.since)))
         except (OSError, ValueError, TypeError):
             continue
     return {process: entry for _, process, entry in sorted(entries) if entry.role == RUN}

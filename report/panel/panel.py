@@ -44,7 +44,7 @@ class Panel:
             self._test = shown.test
             self.close()
             self._tail = Tail(shown.recording)
-            self.feed = Feed(self._tail, self._window, self._clock)
+            self.feed = Feed(self._tail, self._window, self._clock, since_ns=shown.since_ns)
         self.feed.look()
 
     def state(self, session: str) -> dict[str, Any]:

@@ -42,6 +42,7 @@ class Shown(NamedTuple):
     own: bool  # whether this panel has started it
     reached: bool  # whether the operator's link to it is open
     told: Told = Told()
+    since_ns: int = 0  # Unix time of its begin: a recording that was written before is another test's
 
 
 class Snapshot(NamedTuple):

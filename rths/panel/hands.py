@@ -24,7 +24,7 @@ from common.plan.plan import Plan
 from common.plan.read import parse
 from common.roles import title
 from report.panel.desk import DONE, REFUSED, UNHEARD, Outcome, Present
-from report.panel.snapshot import Looked, Shown, Snapshot
+from report.panel.snapshot import Looked, Shown, Snapshot, Told
 from report.panel.words import ARM, CHECK, MACHINE
 from rths.panel.child import Check, RunCommand
 from rths.perform.operate import PATIENCE_S, Given, Outstanding, line
@@ -325,13 +325,19 @@ class Hands:
         """The test that the pages show."""
         command, reached = self._command, self._reached
         if reached is not None:
-            entry, plan = reached.entry, reached.plan
+            entry = reached.entry
             own = command is not None and named(entry.test, command.process) == reached.test
-            shown = Shown(
-                reached.test, entry.test, plan, reached.digest, None, own, reached.orders is not None
+            return Shown(
+                test=reached.test,
+                name=entry.test,
+                plan=reached.plan,
+                digest=reached.digest,
+                recording=Path(entry.recording) if entry.recording else None,
+                own=own,
+                reached=reached.orders is not None,
+                told=command.told if own and command is not None else Told(),
+                since_ns=round(entry.since * 1e9),
             )
-            shown = shown._replace(recording=Path(entry.recording) if entry.recording else None)
-            return shown._replace(told=command.told) if own and command is not None else shown
         if command is None or self._armed is None:
             return None
         name = self._armed.test.name
