@@ -12,7 +12,7 @@ from common.host.waited import SAY_NS, Waited
 from common.lab import process
 from common.recording.outcome import outcome
 from common.terminal import cli
-from common.terminal.plain_report import PlainReport
+from common.terminal.plain_report import PlainReport, reached
 
 
 def test_progress_is_printed_periodically_with_a_dash_for_missing_numbers(capsys: Any) -> None:
@@ -29,6 +29,20 @@ def test_progress_is_printed_periodically_with_a_dash_for_missing_numbers(capsys
         "t   0.00/40 s  drift  +1.000 mm  round trip    – µs  late 2",
         "t   5.00/40 s  drift  +1.000 mm  round trip  300 µs  late 2",
     ]
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        ({}, "t   6.20/8 s"),
+        ({"earthquake_time": 4.336, "rate": 0.5}, "t   6.20 s, earthquake 4.34/8 s"),
+        ({"earthquake_time": 4.336, "rate": 0.0}, "t   6.20 s, earthquake 4.34/8 s, held"),
+    ],
+)
+def test_progress_is_said_in_the_earthquakes_time_once_the_test_was_held(
+    data: dict[str, float], text: str
+) -> None:
+    assert reached(6.2, 8.0, data) == text
 
 
 def test_an_error_is_printed_once(capsys: Any) -> None:

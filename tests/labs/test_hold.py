@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from common.errors import LostError
+from common.host.clock import VirtualClock
 from common.link.endpoint import Received
 from common.plan import read as plans
 from common.plan.plan import Plan
@@ -24,6 +25,7 @@ from common.signals import OF_STOREYS
 from diagnosis.recorded import record as recorded
 from report.facts.due import due
 from report.facts.summary import summarize
+from report.live.standing import Standing
 from report.run import verdict
 from rths.examine.replay import planned, replay_master, replay_slaves
 from simulation import source, virtual
@@ -233,6 +235,25 @@ def test_a_hold_is_refused_during_too_fast_a_motion_and_the_limit_is_named(
     assert "its limit is 0.1 m" in answer.text
     assert played.error is None
     assert played.bench.master.ticks == plan.ticks
+
+
+def test_the_damper_swings_no_farther_than_was_foreseen(default_plan: Plan, tmp_path: Path) -> None:
+    plan = plans.with_test(default_plan, duration=2.8)
+    assert ordered(plan, {700: "hold", 1500: "resume"}, tmp_path / "a.mcap").error is None
+    run = read(tmp_path / "a.mcap")
+    (lost,) = [event["values"]["energy_lost"] for event in run.events if event["code"] == "hold"]
+    foreseen = np.sqrt(2.0 * lost / (plan.damper.force_scale * plan.damper.stiffness))
+    reached = np.abs(run.columns["slave"]["damper_stroke"][700:1500]).max()
+    assert 0.2 * foreseen < reached < foreseen  # the sum of the worst cases is not far beyond what happens
+
+
+def test_the_live_view_says_how_the_test_is_held(held: Run) -> None:
+    standing, said = Standing(VirtualClock()), []
+    for event in sorted(held.events, key=lambda event: event["t"]):
+        standing.event(event)
+        if event["code"] in ("hold", "held", "resume", "resumed"):
+            said.append(standing.gravest)
+    assert said == ["slowing down to a hold", "held", "resuming", "running"]
 
 
 @pytest.mark.parametrize("word", ["stop", "emergency"])
