@@ -154,7 +154,7 @@ def test_quantisation_errors_agree_with_widrows_model() -> None:
 
 
 @pytest.mark.parametrize("sharpness", [1.0, 2.0, 20.0])
-def test_a_reading_saturates_at_its_limit_and_reads_small_values_as_they_are(sharpness: float) -> None:
+def test_a_saturating_reading_keeps_small_values_and_bends_towards_its_limit(sharpness: float) -> None:
     values = np.array([-1e9, -30.0, -1e-6, 0.0, 1e-6, 30.0, 1e9])
     got = read(values, SensorEffects(saturation=30.0, saturation_sharpness=sharpness, bias=5.0)) - 5.0
     half = 30.0 / 2.0 ** (1.0 / sharpness)

@@ -1,4 +1,4 @@
-"""`rths campaign`: what it refuses, a whole campaign, and one that is killed."""
+"""`rths campaign`: its refusals, a complete campaign, and one that is killed."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def written(folder: Path, goal: str = GOAL, hidden: str = HIDDEN) -> Path:
         ('mode = "by hand"\n[[candidate]]\n', HIDDEN, ("--played", "mine.mcap"), "awaits no test"),
     ],
 )
-def test_what_cannot_be_played_is_said_in_one_sentence(
+def test_a_campaign_that_cannot_be_played_is_refused_in_one_sentence(
     goal: str, hidden: str, words: tuple[str, ...], sentence: str, call: Any, capsys: Any, tmp_path: Path
 ) -> None:
     path = written(tmp_path, goal, hidden)
@@ -66,7 +66,9 @@ def test_what_cannot_be_played_is_said_in_one_sentence(
 
 
 @pytest.mark.slow
-def test_a_campaign_that_is_killed_comes_to_the_same_end(tmp_path: Path, capsys: Any, call: Any) -> None:
+def test_a_campaign_that_is_killed_and_continued_gives_the_same_result(
+    tmp_path: Path, capsys: Any, call: Any
+) -> None:
     """The log of a campaign that was killed whenever it had grown is that of one that nobody killed."""
     path = written(tmp_path)
     assert call("campaign", path, "-o", tmp_path / "whole", "--json") == 0
@@ -95,7 +97,7 @@ def steps(folder: Path) -> list[dict[str, Any]]:
 
 
 def killed_at(goal: Path, folder: Path, lines: int) -> None:
-    """Run the campaign, and kill it once its log has so many lines."""
+    """Run the campaign, and kill it once its log has this many lines."""
     words = [sys.executable, "-m", "rths", "campaign", str(goal), "-o", str(folder)]
     with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         ends = time.monotonic() + PATIENCE

@@ -261,7 +261,7 @@ class TestBoucWen:
             assert abs(s[bouc_wen.HYSTERETIC]) <= 1.0 + 1e-12
 
 
-def test_noise_in_a_motion_begins_no_branch_of_menegotto_and_pinto() -> None:
+def test_noise_in_a_motion_starts_no_branch_of_menegotto_and_pinto() -> None:
     rising = np.linspace(0.0, 4.0 * DY, 400)
     shaken = np.repeat(rising, 2)
     shaken[3::2] -= 5e-5 * DY
@@ -274,7 +274,7 @@ def test_noise_in_a_motion_begins_no_branch_of_menegotto_and_pinto() -> None:
     assert np.max(np.abs(turning - smooth)) > 0.01 * K * DY
 
 
-def test_a_branch_of_menegotto_and_pinto_begins_at_a_turn_that_is_large_enough() -> None:
+def test_a_branch_of_menegotto_and_pinto_begins_at_a_reversal_of_the_least_size() -> None:
     path = DY * np.concatenate([np.linspace(0.0, 3.0, 50), np.linspace(2.9, -3.0, 60)])
     exact, coarse = (forces("menegotto_pinto", path, least_turn=least) for least in (0.0, 0.05))
     assert np.array_equal(exact, coarse)

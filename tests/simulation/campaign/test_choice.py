@@ -46,14 +46,14 @@ def test_the_first_test_is_the_one_with_the_smallest_drift() -> None:
     assert (found.test, found.candidate) == (1, 1)
 
 
-def test_of_tests_that_tell_as_much_the_one_with_the_smallest_drift_is_next() -> None:
+def test_among_equally_informative_tests_the_one_with_the_smallest_drift_is_chosen() -> None:
     found = following(diagnosed())
     assert isinstance(found, Decided)
     assert (found.test, found.candidate, found.bits) == (2, 2, 0.95)
     assert "0.95 bits" in found.why
 
 
-def test_a_test_beyond_the_limits_and_one_that_was_played_are_not_chosen() -> None:
+def test_tests_beyond_the_limits_and_played_tests_are_not_chosen() -> None:
     found = following(Decided(1, 2, 0.0, ""), diagnosed())
     assert isinstance(found, Decided)
     assert found.candidate == 3
@@ -84,7 +84,7 @@ def test_the_same_seed_draws_the_same_random_tests() -> None:
         (HEAD, {"options": (Option(1, 0.0, 0.0, "", 0.009, 0.6),)}, "silent", "tells more about the cause"),
     ],
 )
-def test_each_end_is_said_by_its_name(
+def test_the_reason_for_the_end_of_a_campaign_is_named(
     head: GoalTable, more: dict[str, Any], outcome: str, words: str
 ) -> None:
     found = following(diagnosed(**more), head=head)
@@ -93,23 +93,23 @@ def test_each_end_is_said_by_its_name(
     assert words in found.text
 
 
-def test_when_every_test_of_the_list_is_played_the_campaign_ends() -> None:
+def test_a_campaign_ends_when_every_test_of_its_list_is_played() -> None:
     found = following(Decided(1, 1, 0.0, ""), diagnosed(options=OPTIONS[:1]))
     assert found == Ended("limits", "Every test of the list is played.")
 
 
-def test_where_nothing_may_be_played_no_first_test_is_chosen() -> None:
+def test_if_no_test_is_within_the_limits_no_first_test_is_chosen() -> None:
     assert isinstance(following(Begun("", "", OPTIONS[3:])), Ended)
 
 
-def test_a_test_that_separates_two_causes_surely_tells_the_entropy_of_their_probabilities() -> None:
+def test_a_test_that_separates_two_causes_with_certainty_gives_their_entropy() -> None:
     far = np.array([[0.0, 1e4], [1e4, 0.0]])
     assert list(information.expected(np.array([0.5, 0.5]), far)) == pytest.approx([1.0, 1.0])
     rare = information.expected(np.array([0.9, 0.1]), far)
     assert rare.bits == pytest.approx(-0.9 * np.log2(0.9) - 0.1 * np.log2(0.1))
 
 
-def test_a_test_that_separates_nothing_tells_nothing() -> None:
+def test_a_test_that_separates_no_causes_gives_no_information() -> None:
     found = information.expected(np.array([0.7, 0.3]), np.zeros((2, 2)))
     assert found.bits == pytest.approx(0.0, abs=1e-12)
     assert found.certainty == pytest.approx(0.7**2 + 0.3**2)

@@ -1,4 +1,4 @@
-"""A campaign that is killed at any step goes on as if it had not been: nothing is lost, and nothing happens twice."""
+"""A campaign that is killed at any step continues without losing or repeating a step."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class KilledError(BaseException):
 
 
 class Killer:
-    """Kills a command when it has come by so many places."""
+    """Kills a command after it has passed this many places."""
 
     def __init__(self, after: int | None = None) -> None:
         self.left = after
@@ -112,7 +112,7 @@ def go(
 
 @cache
 def uninterrupted() -> tuple[bytes, int]:
-    """The log of a campaign that nobody kills, and how many places it comes by."""
+    """The log of a campaign that is not killed, and the number of places that it passes."""
     with tempfile.TemporaryDirectory() as folder:
         killer, plays = Killer(), list[int]()
         found = go(Path(folder), killer, plays, killer.told)
@@ -122,7 +122,7 @@ def uninterrupted() -> tuple[bytes, int]:
 
 @settings(max_examples=10, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 20), st.floats(0.0, 1.0)), max_size=3))
-def test_a_campaign_goes_on_from_wherever_it_was_killed(kills: list[tuple[int, float]]) -> None:
+def test_a_campaign_continues_from_any_point_at_which_it_was_killed(kills: list[tuple[int, float]]) -> None:
     whole, places = uninterrupted()
     with tempfile.TemporaryDirectory() as name:
         folder, plays = Path(name), list[int]()
@@ -142,14 +142,14 @@ def test_a_campaign_goes_on_from_wherever_it_was_killed(kills: list[tuple[int, f
 
 
 def torn(path: Path, whole: bytes, share: float) -> None:
-    """Leave a part of the next line behind, as a kill in the middle of writing does."""
+    """Append a part of the next line, as after a kill in the middle of writing."""
     there = path.read_bytes()
     assert whole.startswith(there)
     line = whole[len(there) :].partition(b"\n")[0]
     path.write_bytes(there + line[: int(share * len(line))])
 
 
-def test_a_recording_with_its_name_is_not_played_again(tmp_path: Path) -> None:
+def test_a_test_whose_recording_exists_is_not_played_again(tmp_path: Path) -> None:
     plays: list[int] = []
     with pytest.raises(KilledError):
         go(tmp_path, Killer(2), plays)  # in the diagnosis of the first test
@@ -159,13 +159,13 @@ def test_a_recording_with_its_name_is_not_played_again(tmp_path: Path) -> None:
     assert plays == [1, 2, 3]
 
 
-def test_a_log_that_is_damaged_is_refused_with_its_line(tmp_path: Path) -> None:
+def test_a_damaged_log_is_refused_and_its_line_is_named(tmp_path: Path) -> None:
     (tmp_path / log.LOG).write_bytes(uninterrupted()[0].replace(b'"played"', b'"layed"', 1))
     with pytest.raises(InputError, match="Line 3 of .* is damaged"):
         go(tmp_path, Killer(), [])
 
 
-def test_a_recording_that_was_changed_since_is_refused(tmp_path: Path) -> None:
+def test_a_recording_that_was_changed_after_its_test_is_refused(tmp_path: Path) -> None:
     (tmp_path / "test-01.mcap").write_bytes(b"other")
     actions.refuse_changed(tmp_path / "test-01.mcap", actions.digest_of(tmp_path / "test-01.mcap"))
     for name in ("test-01.mcap", "test-02.mcap"):
@@ -180,12 +180,12 @@ def test_a_log_of_another_campaign_is_refused(tmp_path: Path) -> None:
         go(tmp_path, Killer(), [])
 
 
-def test_two_commands_do_not_work_on_one_campaign(tmp_path: Path) -> None:
+def test_a_second_command_on_the_same_campaign_is_refused(tmp_path: Path) -> None:
     with log.opened(tmp_path), pytest.raises(InputError, match="Another process is at work"):
         go(tmp_path, Killer(), [])
 
 
-def test_where_a_person_plays_the_course_waits_and_goes_on_with_the_recording(tmp_path: Path) -> None:
+def test_a_campaign_played_by_hand_waits_for_each_recording_and_continues_with_it(tmp_path: Path) -> None:
     found = StandIn(campaign(), tmp_path, lambda _plan, _test, _path: False, lambda _path, _judged: None)
     found.killer = Killer()
     with log.opened(tmp_path) as kept:
@@ -205,14 +205,14 @@ def test_where_a_person_plays_the_course_waits_and_goes_on_with_the_recording(tm
             actions.take(own, again, tmp_path, found.plan(again))
 
 
-def test_every_step_is_read_as_it_was_written() -> None:
+def test_every_step_of_the_log_is_read_as_it_was_written() -> None:
     for one in uninterrupted()[0].splitlines():
         assert steps.line(steps.parsed(one)) == one + b"\n"
     cut = steps.Interrupted(1, "test-01-interrupted-1.mcap", 0.001, 0.0)
     assert steps.parsed(steps.line(cut)) == cut
 
 
-def test_a_test_in_real_time_that_was_interrupted_is_kept_and_counts(tmp_path: Path) -> None:
+def test_an_interrupted_test_in_real_time_is_kept_and_counts(tmp_path: Path) -> None:
     own = goal.from_tables(
         {"mode": "real time", "candidate": [{"scales": [0.01, 0.02, 0.03], "durations": 0.1}]}, Path()
     )

@@ -1,4 +1,4 @@
-"""The file of a campaign: what it may hold, and what is refused in one sentence."""
+"""The file of a campaign: accepted contents, and refusals in one sentence."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def read(**more: Any) -> goals.Goal:
     return goals.from_tables(ONE | more, Path())
 
 
-def test_a_candidate_is_each_combination_of_its_scales_durations_and_dampers() -> None:
+def test_the_candidates_are_all_combinations_of_scales_durations_and_dampers() -> None:
     found = read()
     assert [(one.duration, one.amd, one.scale) for one in found.candidates] == [
         (duration, amd, scale) for duration in (2.0, 4.0) for amd in (True, False) for scale in (0.1, 0.2)
@@ -29,12 +29,12 @@ def test_a_candidate_is_each_combination_of_its_scales_durations_and_dampers() -
     assert plan.test.seed == found.plan.test.seed + 2
 
 
-def test_units_may_be_given_as_texts() -> None:
+def test_values_of_a_campaign_may_be_given_with_units() -> None:
     found = read(limits={"drift": "12 mm", "energy": "1.5 kJ"})
     assert [found.limits.drift, found.limits.energy] == pytest.approx([0.012, 1500.0])
 
 
-def test_the_digest_is_of_all_but_what_is_hidden() -> None:
+def test_the_digest_of_a_campaign_covers_all_but_the_hidden_reality() -> None:
     assert read().digest == read(reality="hidden.toml").digest
     assert (
         len({read().digest, read(tests=3).digest, read(limits={"drift": 0.01}).digest, read(gap=0.1).digest})
@@ -62,13 +62,13 @@ def test_the_digest_is_of_all_but_what_is_hidden() -> None:
         ({"limits": {"drift": "3 N"}}, "drift in [limits]"),
     ],
 )
-def test_what_no_campaign_can_hold_is_refused_in_one_sentence(tables: dict[str, Any], sentence: str) -> None:
+def test_a_wrong_campaign_file_is_refused_in_one_sentence(tables: dict[str, Any], sentence: str) -> None:
     with pytest.raises(PlanError) as caught:
         read(**tables)
     assert sentence in str(caught.value)
 
 
-def test_the_paths_of_a_plan_hold_in_another_folder(tmp_path: Path) -> None:
+def test_the_paths_of_a_campaigns_plan_are_valid_from_another_folder(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text('[ground_motion]\nrecord = "own.csv"\ndt = 0.01\nunit = "g"\n')
     found = goals.from_tables({"plan": "own.toml", "candidate": [{}]}, tmp_path)
     assert goals.plan_of(found, 1, 1).ground_motion.record == str(tmp_path / "own.csv")
