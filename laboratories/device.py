@@ -23,7 +23,18 @@ from common.plan.schema import Rule, as_type, in_range, nearest
 from common.safety.ramp import Ramp
 from common.signals import Channels, Signal
 from laboratories.descent import HoldRamp
-from laboratories.kind import Chosen, Coupling, Follows, Kind, Limited, Machine, Sensed, usual
+from laboratories.kind import (
+    Chosen,
+    Coasting,
+    Coupling,
+    Follows,
+    Kind,
+    Limited,
+    Machine,
+    Moving,
+    Sensed,
+    usual,
+)
 from models.compiled import bound, jit
 from models.registry import Array
 from models.system import System
@@ -34,7 +45,18 @@ if TYPE_CHECKING:
 # a kernel is passed by its address, which Numba calls experimental; tests show that it works in every loop
 warnings.filterwarnings("ignore", category=numba.NumbaExperimentalFeatureWarning)
 
-__all__ = ["Channels", "Device", "Fault", "Follows", "Limited", "Nominal", "Signal", "kernel"]
+__all__ = [
+    "Channels",
+    "Coasting",
+    "Device",
+    "Fault",
+    "Follows",
+    "Limited",
+    "Moving",
+    "Nominal",
+    "Signal",
+    "kernel",
+]
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
