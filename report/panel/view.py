@@ -160,7 +160,7 @@ def phase(snapshot: Snapshot, labs: list[dict[str, Any]], feed: Feed) -> str:
     if GONE in modes or modes == {LEFT}:
         return "a laboratory has no process" if GONE in modes else "the laboratories have left"
     words = [mode.value.replace("_", " ") for mode in GRAVEST]
-    found = next((word for word in words if word in modes), "starting")
+    found = next((word for word in words if word in modes), UNKNOWN if UNKNOWN in modes else "starting")
     return feed.standing.pace or found if found == Mode.RUNNING.value else found
 
 

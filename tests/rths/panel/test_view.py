@@ -132,6 +132,7 @@ def test_a_test_that_was_started_elsewhere_is_known_only_by_its_recording(watche
     watched.shown = watched.shown._replace(own=False)
     state = watched.state()
     assert [(lab["mode"], lab["age"]) for lab in state["labs"]] == [("not known", None)] * 2
+    assert state["phase"] == "not known"
     watched.to(0.5)
     assert {mode for mode, _ in watched.labs().values()} == {"running"}
 
