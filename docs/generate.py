@@ -19,7 +19,7 @@ from common.safety.modes import MEANING, TURNS, Mode, mermaid
 from common.signals import CLIENT, OF_STOREYS, SENT, TOPICS
 from common.udp import packets
 from diagnosis.report import schema
-from docs import reference_tables
+from docs import reference_tables, tried
 from docs.markdown import quantity, table
 
 EVERY_KIND = '[slave.a]\nkind = "table"\n[slave.b]\nkind = "column"\n'  # at slaves
@@ -64,6 +64,7 @@ def parts() -> dict[str, dict[str, str]]:
             "states of a rig": reference_tables.numbered(packets.STATES.values()),
             "channels of kinds": reference_tables.channels(),
         },
+        "reference/tried.md": {"locked": tried.locked()},
         "reference/signals.md": {"topics": topics()},
         "reference/commands.md": {"commands": reference_tables.commands()},
         "reference/effects.md": {"effects": reference_tables.effects()},
