@@ -22,7 +22,7 @@ def test_frames_come_in_order_and_a_missing_one_is_awaited_for_a_bounded_time() 
     began = time.monotonic()
     while inbox.get(0.05) is not None or time.monotonic() - began < 0.05:
         pass
-    assert time.monotonic() - began < 2.0
+    assert time.monotonic() - began < HANG_S
 
 
 def test_a_waiting_consumer_is_woken() -> None:
@@ -61,6 +61,6 @@ def test_a_signal_handler_does_not_prolong_the_wait() -> None:
         threading.Timer(0.05, os.kill, [os.getpid(), signal.SIGUSR1]).start()
         began = time.monotonic()
         assert inbox.get(0.1) is None
-        assert time.monotonic() - began < 3.0
+        assert time.monotonic() - began < HANG_S
     finally:
         signal.signal(signal.SIGUSR1, before)

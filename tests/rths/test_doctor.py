@@ -130,10 +130,8 @@ def test_the_doctors_exchange_messages_can_be_encoded() -> None:
 
 def test_a_slave_that_fails_ends_the_exchange_with_its_message(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rths.checkup.children.realtime.assign", lambda _count: [None, 10**6])
-    began = time.monotonic()
     _, found = children.exchange(2_000_000, 1.0, "on")
-    assert "error" in found
-    assert time.monotonic() - began < exchange.PATIENCE
+    assert "the exchange did not end" not in found["error"]
 
 
 def test_percentiles_follow_the_nearest_rank() -> None:
