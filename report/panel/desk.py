@@ -25,14 +25,14 @@ NUMBER = 2**53  # above every number of a page, which counts in floats
 SENT, DONE, REFUSED, UNHEARD = "sent", "done", "refused", "not heard"
 
 
-class Outcome(NamedTuple):
+class OrderOutcome(NamedTuple):
     """What became of an order: `sent` while it is under way, then `done`, `refused` or `not heard`."""
 
     state: str
     text: str
 
 
-class Request(NamedTuple):
+class PageOrder(NamedTuple):
     """An order of a page; `test` and the plan's `digest` are what it showed, `seen` (ms, server's clock) says when."""
 
     session: str
@@ -52,31 +52,31 @@ class Present(NamedTuple):
     armable: str = ""
 
 
-class Hands(Protocol):
+class OrderExecutor(Protocol):
     """Carries orders out."""
 
     @property
     def present(self) -> Present:
         """What is there at this moment."""
 
-    def carry_out(self, word: str, digest: str, reason: str) -> Future[Outcome]:
+    def carry_out(self, word: str, digest: str, reason: str) -> Future[OrderOutcome]:
         """Begin with an order; the outcome comes later, from another thread."""
 
 
-class Entry:
+class TakenOrder:
     """An order that was taken, and what became of it."""
 
-    def __init__(self, request: Request, page: int, at: int, settled: Future[Outcome]) -> None:
+    def __init__(self, request: PageOrder, page: int, at: int, settled: Future[OrderOutcome]) -> None:
         self.request = request
         self.page = page  # number of the page that gave it, for readers
         self.at = at  # ns
         self.settled = settled
 
     @property
-    def outcome(self) -> Outcome:
+    def outcome(self) -> OrderOutcome:
         """What is known of it at this moment."""
         if not self.settled.done():
-            return Outcome(SENT, "")
+            return OrderOutcome(SENT, "")
         return self.settled.result()
 
 
@@ -85,11 +85,11 @@ class Session:
 
     def __init__(self, page: int) -> None:
         self.page = page
-        self.entries: OrderedDict[int, Entry] = OrderedDict()
+        self.entries: OrderedDict[int, TakenOrder] = OrderedDict()
         self.highest = 0
         self.forgotten = 0  # the highest number whose outcome is not kept any more
 
-    def keep(self, entry: Entry) -> Entry:
+    def keep(self, entry: TakenOrder) -> TakenOrder:
         """Keep an order and let the oldest go."""
         number = entry.request.number
         self.entries[number] = entry
@@ -102,12 +102,12 @@ class Session:
 class Desk:
     """Takes the orders of all pages; `clock` is that of the server."""
 
-    def __init__(self, hands: Hands, clock: Clock) -> None:
-        self._hands = hands
+    def __init__(self, executor: OrderExecutor, clock: Clock) -> None:
+        self._executor = executor
         self._clock = clock
         self._sessions: OrderedDict[str, Session] = OrderedDict()
         self._pages = 0
-        self.newest: deque[Entry] = deque(maxlen=SHOWN)
+        self.newest: deque[TakenOrder] = deque(maxlen=SHOWN)
 
     def enter(self) -> str:
         """The session of a new page."""
@@ -125,7 +125,7 @@ class Desk:
         self._sessions.move_to_end(session)
         return self._sessions[session].page
 
-    def take(self, request: Request) -> Entry:
+    def take(self, request: PageOrder) -> TakenOrder:
         """Carry an order out, refuse it, or find what became of the same number before."""
         session = self._sessions.get(request.session)
         if session is None:
@@ -137,16 +137,16 @@ class Desk:
         if complaint := self._complaint(request, session):
             entry = refused(request, session.page, self._clock.now(), complaint)
         else:
-            carried = self._hands.carry_out(request.word, request.digest, request.reason)
-            entry = Entry(request, session.page, self._clock.now(), carried)
+            carried = self._executor.carry_out(request.word, request.digest, request.reason)
+            entry = TakenOrder(request, session.page, self._clock.now(), carried)
         if session.forgotten < request.number < NUMBER:
             session.keep(entry)
         self.newest.appendleft(entry)
         return entry
 
-    def _complaint(self, request: Request, session: Session) -> str:
+    def _complaint(self, request: PageOrder, session: Session) -> str:
         """Why an order is not carried out, empty where it is."""
-        word, present = WORDS.get(request.word), self._hands.present
+        word, present = WORDS.get(request.word), self._executor.present
         if word is None or not session.forgotten < request.number < NUMBER:
             return "This is no order of this page."
         if word.of_test and not present.test:
@@ -165,14 +165,14 @@ class Desk:
         return stale or other or unplanned(request, word, present)
 
 
-def refused(request: Request, page: int, now: int, text: str) -> Entry:
+def refused(request: PageOrder, page: int, now: int, text: str) -> TakenOrder:
     """An order that is not carried out."""
-    settled: Future[Outcome] = Future()
-    settled.set_result(Outcome(REFUSED, text))
-    return Entry(request, page, now, settled)
+    settled: Future[OrderOutcome] = Future()
+    settled.set_result(OrderOutcome(REFUSED, text))
+    return TakenOrder(request, page, now, settled)
 
 
-def unplanned(request: Request, word: Word, present: Present) -> str:
+def unplanned(request: PageOrder, word: Word, present: Present) -> str:
     """Why an order is not for the plan that the page showed, empty where it is or where it is for no plan."""
     digest = present.digest if word.of_test else present.armable
     if word.planned and (not digest or request.digest != digest):

@@ -11,7 +11,7 @@ from tornado.httputil import HTTPServerRequest
 from tornado.routing import Matcher, Rule, RuleRouter
 from tornado.web import Application, RequestHandler
 
-from report.panel.desk import Desk, Request
+from report.panel.desk import Desk, PageOrder
 from report.panel.guard import Guard
 
 ANSWER_S = (
@@ -20,7 +20,7 @@ ANSWER_S = (
 
 
 def guarded(guard: Guard, inner: Application) -> RuleRouter:
-    """A server that hands on what may be answered, and refuses everything else."""
+    """A server that passes on what may be answered, and refuses everything else."""
     gate = Application([(".*", Refusal, {"guard": guard})])
     return RuleRouter([Rule(Admitted(guard), inner), Rule(Everything(), gate)])
 
@@ -100,17 +100,17 @@ class OrderHandler(RequestHandler):
         self.write(entry.outcome._asdict())
 
 
-def understood(body: bytes) -> Request | None:
+def understood(body: bytes) -> PageOrder | None:
     """The order in a request, None where there is none: every field must be there with its own type, and no other."""
     try:
         found = json.loads(body)
     except (ValueError, RecursionError):
         return None
-    kinds = {name: type(value) for name, value in Request._field_defaults.items()} | {
+    kinds = {name: type(value) for name, value in PageOrder._field_defaults.items()} | {
         "session": str,
         "number": int,
         "word": str,
     }
     if not isinstance(found, dict) or {name: type(value) for name, value in found.items()} != kinds:
         return None
-    return Request(**found)
+    return PageOrder(**found)

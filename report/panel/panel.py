@@ -12,26 +12,31 @@ from common.host.clock import Clock
 from common.recording.reader import Tail
 from report.live.feed import Feed
 from report.page import block_of
-from report.panel.desk import Desk, Hands
+from report.panel.desk import Desk, OrderExecutor
 from report.panel.guard import Guard
 from report.panel.handlers import OrderHandler, StateHandler
 from report.panel.snapshot import Snapshot
-from report.panel.view import View
+from report.panel.view import PanelView
 from report.panel.words import WORDS
 
 NO_TEST = Path("no test")  # stands for the recording while there is none
 
 
 class Panel:
-    """The state of one panel; `watched` returns what its hands see at the moment."""
+    """The state of one panel; `watched` returns what its executor sees at the moment."""
 
     def __init__(
-        self, hands: Hands, watched: Callable[[], Snapshot], guard: Guard, window: float, clock: Clock
+        self,
+        executor: OrderExecutor,
+        watched: Callable[[], Snapshot],
+        guard: Guard,
+        window: float,
+        clock: Clock,
     ) -> None:
         self.guard = guard
-        self.desk = Desk(hands, clock)
+        self.desk = Desk(executor, clock)
         self.watched = watched
-        self.view = View(self.desk, clock)
+        self.view = PanelView(self.desk, clock)
         self._window, self._clock = window, clock
         self._tail = Tail(NO_TEST)
         self.feed = Feed(self._tail, window, clock)

@@ -12,7 +12,7 @@ from common.plan.plan import Plan
 NONE: Mapping[str, Any] = MappingProxyType({})
 
 
-class Looked(NamedTuple):
+class CheckResult(NamedTuple):
     """The newest check of plan or machine: what the command found, or its complaint."""
 
     found: Mapping[str, Any] = NONE
@@ -21,7 +21,7 @@ class Looked(NamedTuple):
     busy: bool = False
 
 
-class Told(NamedTuple):
+class RunReports(NamedTuple):
     """What the processes of a test have reported to the panel that started it."""
 
     modes: Mapping[str, tuple[str, int]] = NONE  # by laboratory, and when it came
@@ -41,7 +41,7 @@ class Shown(NamedTuple):
     recording: Path | None
     own: bool  # whether this panel has started it
     reached: bool  # whether the operator's link to it is open
-    told: Told = Told()
+    told: RunReports = RunReports()
     since_ns: int = 0  # Unix time of its begin: a recording that was written before is another test's
 
 
@@ -50,6 +50,6 @@ class Snapshot(NamedTuple):
 
     file: str  # of the plan that can be armed
     shown: Shown | None = None
-    plan: Looked = Looked()
-    machine: Looked = Looked()
+    plan: CheckResult = CheckResult()
+    machine: CheckResult = CheckResult()
     last: tuple[tuple[str, str], ...] = ()  # who ended the newest test that this panel started, and why

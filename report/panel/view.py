@@ -12,7 +12,7 @@ from report.live.feed import Feed
 from report.live.levels import limits
 from report.live.standing import GRAVEST
 from report.panel.desk import Desk
-from report.panel.snapshot import Looked, Shown, Snapshot
+from report.panel.snapshot import CheckResult, Shown, Snapshot
 from report.panel.words import WORDS
 from report.plan import text as plan_text
 from report.text.formats import quantity
@@ -30,7 +30,7 @@ GONE, LEFT, UNKNOWN = "no process", "left", "not known"
 CAUSES = 4  # that are shown: one for each laboratory of a usual test
 
 
-class View:
+class PanelView:
     """Everything that a page shows; `clock` is that of the server."""
 
     def __init__(self, desk: Desk, clock: Clock) -> None:
@@ -109,7 +109,7 @@ class View:
             **self._looked(looked),
         }
 
-    def _machine(self, looked: Looked) -> dict[str, Any]:
+    def _machine(self, looked: CheckResult) -> dict[str, Any]:
         """What this machine lacks, as `rths doctor` says it."""
         found = looked.found
         failed: dict[str, list[str]] = {}
@@ -121,7 +121,7 @@ class View:
         said = found["verdict"]["sentence"] if found else ""
         return {"lacks": lacks, "verdict": said, **self._looked(looked)}
 
-    def _looked(self, looked: Looked) -> dict[str, Any]:
+    def _looked(self, looked: CheckResult) -> dict[str, Any]:
         age = self._seconds(looked.at) if looked.at else None
         return {"busy": looked.busy, "complaint": looked.complaint, "age": age}
 

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from common.safety.modes import Mode
-from report.panel.snapshot import Looked, Told
+from report.panel.snapshot import CheckResult, RunReports
 from rths.perform.processes import ROOT
 
 KEPT = 12  # lines that are shown of what a command says
@@ -84,10 +84,10 @@ class RunCommand:
         return self._process.pid
 
     @property
-    def told(self) -> Told:
+    def told(self) -> RunReports:
         """What it has reported."""
         names, at = self._alive
-        return Told(self._modes, names, at, tuple(self._causes), tuple(self._said))
+        return RunReports(self._modes, names, at, tuple(self._causes), tuple(self._said))
 
     @property
     def over(self) -> bool:
@@ -118,19 +118,19 @@ class Check:
         self._out, self._err = self._process.communicate()
 
     @property
-    def busy(self) -> Looked:
+    def busy(self) -> CheckResult:
         """What is known while it runs."""
-        return Looked(at=self._at, busy=True)
+        return CheckResult(at=self._at, busy=True)
 
     @property
-    def found(self) -> Looked | None:
+    def found(self) -> CheckResult | None:
         """What it found, None while it runs."""
         if self._reader.is_alive():
             return None
         with contextlib.suppress(ValueError):
-            return Looked(json.loads(self._out), at=self._at)
+            return CheckResult(json.loads(self._out), at=self._at)
         lines = self._err.strip().removeprefix("rths: ").splitlines()
-        return Looked(complaint=lines[-1] if lines else "The check ended without a word.", at=self._at)
+        return CheckResult(complaint=lines[-1] if lines else "The check ended without a word.", at=self._at)
 
     def end(self) -> None:
         """End it."""

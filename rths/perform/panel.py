@@ -54,13 +54,13 @@ def run(args: argparse.Namespace) -> int:
     from report.live.server import Server
     from report.panel import guard
     from report.panel.panel import Panel
-    from rths.panel.hands import Hands, Options
+    from rths.panel.executor import Options, PanelExecutor
 
     check(args)
     cli.load_plan(args)  # so that a wrong plan is said at once
     token = secrets.token_urlsafe(32) if args.token or not guard.local(args.host) else ""
     stopping = Stopper()
-    hands = Hands(
+    executor = PanelExecutor(
         Options(
             partial(cli.load_plan, args),
             str(cli.plan_path(args.plan)),
@@ -73,14 +73,14 @@ def run(args: argparse.Namespace) -> int:
 
         def made(port: int) -> Panel:
             place = guard.Guard(args.host, port, token)
-            return Panel(hands, lambda: hands.snapshot, place, WINDOW, MonotonicClock())
+            return Panel(executor, lambda: executor.snapshot, place, WINDOW, MonotonicClock())
 
         server = Server(None, args.port, RATE, host=args.host, panel=made)
         lower()
         announce(args, server.url)
         server.run(stopping, leave=False)
     finally:
-        if parting := hands.close():
+        if parting := executor.close():
             sys.stderr.write(f"panel: {parting}\n")
     return 0
 

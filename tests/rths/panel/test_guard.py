@@ -16,7 +16,7 @@ from tornado.web import Application
 
 from common.errors import InputError
 from common.host.clock import MonotonicClock
-from report.panel.desk import Desk, Outcome, Present
+from report.panel.desk import Desk, OrderOutcome, Present
 from report.panel.guard import Guard, checked, local
 from report.panel.handlers import OrderHandler, StateHandler, guarded, understood
 
@@ -121,18 +121,18 @@ def test_a_request_that_is_not_an_order_is_rejected(changed: dict[str, Any]) -> 
 
 
 class Hand:
-    """Hands that settle an order after a moment, as laboratories do."""
+    """An executor that settles an order after a moment, as laboratories do."""
 
     present = Present("a-1", "d", "d")
 
     def __init__(self) -> None:
         self.did: list[str] = []
 
-    def carry_out(self, word: str, digest: str, reason: str) -> Future[Outcome]:
+    def carry_out(self, word: str, digest: str, reason: str) -> Future[OrderOutcome]:
         del digest, reason
         self.did.append(word)
-        settled: Future[Outcome] = Future()
-        asyncio.get_running_loop().call_later(0.01, settled.set_result, Outcome("done", word))
+        settled: Future[OrderOutcome] = Future()
+        asyncio.get_running_loop().call_later(0.01, settled.set_result, OrderOutcome("done", word))
         return settled
 
 
@@ -140,7 +140,7 @@ Story = Callable[[str, Desk, Hand], Awaitable[None]]
 
 
 def served(story: Story, token: str = "") -> None:
-    """Run a test's coroutine against a server of its own; it gets the address, the desk and the hands."""
+    """Run a test's coroutine against a server of its own; it gets the address, the desk and the executor."""
 
     async def play() -> None:
         sockets, port = bind_unused_port()

@@ -11,7 +11,7 @@ import pytest
 
 from common.host.clock import VirtualClock
 from common.plan.plan import Plan
-from report.panel.desk import Outcome, Present
+from report.panel.desk import OrderOutcome, Present
 from report.panel.guard import Guard
 from report.panel.panel import Panel
 from report.panel.snapshot import Shown, Snapshot
@@ -20,11 +20,11 @@ BEGUN_S = 2_000_000_000  # Unix time at which the second test begins, s: in the 
 
 
 class Idle:
-    """Hands that do nothing."""
+    """An executor that does nothing."""
 
     present = Present()
 
-    def carry_out(self, word: str, digest: str, reason: str) -> Future[Outcome]:
+    def carry_out(self, word: str, digest: str, reason: str) -> Future[OrderOutcome]:
         raise AssertionError(word, digest, reason)
 
 

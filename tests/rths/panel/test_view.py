@@ -17,9 +17,9 @@ from common.reality import reality
 from common.recording.reader import Tail
 from common.terminal.cli import plan_path
 from report.live.feed import Feed
-from report.panel.desk import Desk, Outcome, Present, Request
-from report.panel.snapshot import Looked, Shown, Snapshot, Told
-from report.panel.view import View
+from report.panel.desk import Desk, OrderOutcome, PageOrder, Present
+from report.panel.snapshot import CheckResult, RunReports, Shown, Snapshot
+from report.panel.view import PanelView
 from simulation import virtual
 from tests.helpers import with_table
 
@@ -27,11 +27,11 @@ SECOND = 1_000_000_000
 
 
 class Idle:
-    """Hands that never finish."""
+    """An executor that never finishes."""
 
     present = Present("a-1", "d", "d")
 
-    def carry_out(self, word: str, digest: str, reason: str) -> Future[Outcome]:
+    def carry_out(self, word: str, digest: str, reason: str) -> Future[OrderOutcome]:
         del word, digest, reason
         return Future()
 
@@ -47,7 +47,7 @@ class Watched:
         self.feed = Feed(self.tail, 10.0, self.clock)
         self.desk = Desk(Idle(), self.clock)
         self.page = self.desk.enter()
-        self.view = View(self.desk, self.clock)
+        self.view = PanelView(self.desk, self.clock)
         self.shown: Shown | None = Shown("a-1", "a", plan, plan.digest(), path, own=True, reached=True)
 
     def to(self, share: float) -> None:
@@ -62,7 +62,7 @@ class Watched:
         now = self.clock.time
         assert self.shown is not None
         before = dict(self.shown.told.modes)
-        told = Told(before | {lab: (mode, now) for lab, mode in modes.items()}, alive, now)
+        told = RunReports(before | {lab: (mode, now) for lab, mode in modes.items()}, alive, now)
         self.shown = self.shown._replace(told=told)
 
     def state(self, **more: Any) -> dict[str, Any]:
@@ -190,7 +190,7 @@ def test_causes_and_latched_laboratories_are_shown(tmp_path: Path, short_plan: P
 
 def test_before_anything_is_recorded_the_reported_causes_are_shown(watched: Watched) -> None:
     assert watched.shown is not None
-    watched.shown = watched.shown._replace(told=Told(causes=(("slave", "The door is open."),)))
+    watched.shown = watched.shown._replace(told=RunReports(causes=(("slave", "The door is open."),)))
     assert watched.state()["causes"] == [{"lab": "slave", "t": "", "text": "The door is open."}]
 
 
@@ -204,7 +204,7 @@ def test_plan_and_machine_are_shown_with_the_results_of_their_commands(watched: 
     machine = {"checks": checks, "notes": ["A rival runs."], "verdict": {"sentence": "It lacks one thing."}}
     machine["realtime"] = {"missing": ["There is no right to it."]}
     watched.clock.time += SECOND
-    looked = {"plan": Looked(found, at=99 * SECOND), "machine": Looked(machine, at=100 * SECOND)}
+    looked = {"plan": CheckResult(found, at=99 * SECOND), "machine": CheckResult(machine, at=100 * SECOND)}
     state = watched.state(**looked)
     assert state["plan"]["digest"] == load(plan).digest()
     assert state["plan"]["ready"]
@@ -218,12 +218,12 @@ def test_plan_and_machine_are_shown_with_the_results_of_their_commands(watched: 
         "A rival runs.",
     ]
     assert state["machine"]["verdict"] == "It lacks one thing."
-    busy = watched.state(plan=Looked(at=SECOND, busy=True))["plan"]
+    busy = watched.state(plan=CheckResult(at=SECOND, busy=True))["plan"]
     assert (busy["busy"], busy["digest"]) == (True, "")
 
 
 def test_orders_are_listed_with_their_page_and_with_a_number_for_their_own_page(watched: Watched) -> None:
-    watched.desk.take(Request(watched.page, 1, "stop", "a-1", seen=watched.clock.time // 1_000_000))
+    watched.desk.take(PageOrder(watched.page, 1, "stop", "a-1", seen=watched.clock.time // 1_000_000))
     other = watched.desk.enter()
     mine, theirs = (
         watched.view.state(Snapshot("p", watched.shown), watched.feed, page)["orders"][0]

@@ -23,8 +23,8 @@ from common.link.endpoint import Endpoint
 from common.plan.plan import Plan
 from common.plan.read import parse
 from common.roles import title
-from report.panel.desk import DONE, REFUSED, UNHEARD, Outcome, Present
-from report.panel.snapshot import Looked, Shown, Snapshot, Told
+from report.panel.desk import DONE, REFUSED, UNHEARD, OrderOutcome, Present
+from report.panel.snapshot import CheckResult, RunReports, Shown, Snapshot
 from report.panel.words import ARM, CHECK, MACHINE
 from rths.panel.child import Check, RunCommand
 from rths.perform.operate import PATIENCE_S, Given, Outstanding, line
@@ -34,7 +34,7 @@ IDLE_S = 0.05  # s between two turns while none is; a new order ends the wait at
 LOOK_S = 0.3  # s between two looks for tests on this machine
 STOPS = (STOP, EMERGENCY)
 BUSY = "A test runs, which a check would disturb."
-OVER = Outcome(UNHEARD, "This part of the panel has ended: start `rths panel` again.")
+OVER = OrderOutcome(UNHEARD, "This part of the panel has ended: start `rths panel` again.")
 
 
 class Job(NamedTuple):
@@ -43,7 +43,7 @@ class Job(NamedTuple):
     word: str
     digest: str
     reason: str
-    settled: Future[Outcome]
+    settled: Future[OrderOutcome]
     until: float  # s, when it is given up for want of a link
 
 
@@ -90,8 +90,8 @@ class Reached:
             self._endpoint.close()
 
 
-class Hands:
-    """The panel's hands; `snapshot` and `present` may be read from any thread."""
+class PanelExecutor:
+    """The panel's executor; `snapshot` and `present` may be read from any thread."""
 
     def __init__(self, options: Options) -> None:
         self._options = options
@@ -104,14 +104,14 @@ class Hands:
         self._digest = ""  # of that plan
         self._arming: Job | None = None
         self._checks: dict[str, tuple[Check, Job]] = {}
-        self._looked = {CHECK: Looked(), MACHINE: Looked()}
+        self._looked = {CHECK: CheckResult(), MACHINE: CheckResult()}
         self._last: tuple[tuple[str, str], ...] = ()
         self._shown: Shown | None = None
         self._sought = 0.0
         self._closing = threading.Event()
         self._ended = False
         self._opener = ThreadPoolExecutor(1)
-        self._thread = threading.Thread(target=self._run, name="hands")
+        self._thread = threading.Thread(target=self._run, name="executor")
         self._thread.start()
 
     # -- what others see --------------------------------------------------------------------------
@@ -128,9 +128,9 @@ class Hands:
         shown, armable = self._shown, str(self._looked[CHECK].found.get("digest", ""))
         return Present(shown.test, shown.digest, armable) if shown else Present(armable=armable)
 
-    def carry_out(self, word: str, digest: str, reason: str) -> Future[Outcome]:
+    def carry_out(self, word: str, digest: str, reason: str) -> Future[OrderOutcome]:
         """Begin with an order at the next turn."""
-        settled: Future[Outcome] = Future()
+        settled: Future[OrderOutcome] = Future()
         if self._ended:
             settled.set_result(OVER)
             return settled
@@ -200,7 +200,7 @@ class Hands:
                 text = (
                     "The test's command ends it in order, as by Ctrl-C: its laboratories are not linked yet."
                 )
-                job.settled.set_result(Outcome(DONE, text))
+                job.settled.set_result(OrderOutcome(DONE, text))
             case _:
                 self._waiting.append(job)
 
@@ -208,10 +208,10 @@ class Hands:
 
     def _check(self, job: Job) -> None:
         if self._command is not None or self._reached is not None:
-            job.settled.set_result(Outcome(REFUSED, BUSY))
+            job.settled.set_result(OrderOutcome(REFUSED, BUSY))
             return
         if self._checks:
-            job.settled.set_result(Outcome(REFUSED, "A check is under way already."))
+            job.settled.set_result(OrderOutcome(REFUSED, "A check is under way already."))
             return
         words = {CHECK: ["check", *self._options.plan], MACHINE: ["doctor", *self._options.doctor]}
         check = Check(words[job.word])
@@ -225,16 +225,16 @@ class Hands:
             del self._checks[word]
             self._looked = {**self._looked, word: found}
             if found.complaint:
-                job.settled.set_result(Outcome(REFUSED, found.complaint))
+                job.settled.set_result(OrderOutcome(REFUSED, found.complaint))
             else:
-                job.settled.set_result(Outcome(DONE, "See what was found."))
+                job.settled.set_result(OrderOutcome(DONE, "See what was found."))
 
     # -- the test's command -----------------------------------------------------------------------
 
     def _arm(self, job: Job) -> None:
         complaint = self._not_to_arm(job)
         if complaint:
-            job.settled.set_result(Outcome(REFUSED, complaint))
+            job.settled.set_result(OrderOutcome(REFUSED, complaint))
             return
         self._arming = job
         self._last = ()
@@ -262,7 +262,7 @@ class Hands:
         if arming is not None and command.ready:
             self._arming = None
             arming.settled.set_result(
-                Outcome(DONE, "All laboratories are armed; nothing moves before Start.")
+                OrderOutcome(DONE, "All laboratories are armed; nothing moves before Start.")
             )
         if command.over:
             told = command.told
@@ -271,7 +271,9 @@ class Hands:
             self._command = None
             if arming is not None and self._arming is not None:
                 self._arming = None
-                arming.settled.set_result(Outcome(REFUSED, " ".join(told.said[-1:]) or "The test ended."))
+                arming.settled.set_result(
+                    OrderOutcome(REFUSED, " ".join(told.said[-1:]) or "The test ended.")
+                )
 
     # -- the laboratories -------------------------------------------------------------------------
 
@@ -296,7 +298,7 @@ class Hands:
         self._command.interrupt()
         if self._arming is not None:
             text = "The plan has changed since it was checked: the test is ended before anything moves."
-            self._arming.settled.set_result(Outcome(REFUSED, text))
+            self._arming.settled.set_result(OrderOutcome(REFUSED, text))
             self._arming = None
 
     def _exchange(self) -> None:
@@ -310,14 +312,14 @@ class Hands:
                 self._given[orders.give(job.word, job.reason)] = job
             elif time.monotonic() >= job.until:
                 self._waiting.remove(job)
-                job.settled.set_result(Outcome(UNHEARD, "There is no link to the laboratories."))
+                job.settled.set_result(OrderOutcome(UNHEARD, "There is no link to the laboratories."))
         if orders is not None:
             for given in orders.look(TURN_S if self._given else 0.0):
                 self._given.pop(given.wish.press).settled.set_result(outcome(given))
         elif self._given:
             for job in self._given.values():
                 job.settled.set_result(
-                    Outcome(UNHEARD, "The test ended before all laboratories had answered.")
+                    OrderOutcome(UNHEARD, "The test ended before all laboratories had answered.")
                 )
             self._given = {}
 
@@ -335,7 +337,7 @@ class Hands:
                 recording=Path(entry.recording) if entry.recording else None,
                 own=own,
                 reached=reached.orders is not None,
-                told=command.told if own and command is not None else Told(),
+                told=command.told if own and command is not None else RunReports(),
                 since_ns=round(entry.since * 1e9),
             )
         if command is None or self._armed is None:
@@ -356,7 +358,7 @@ def named(test: str, process: int) -> str:
     return f"{test}-{process}"
 
 
-def outcome(given: Given) -> Outcome:
+def outcome(given: Given) -> OrderOutcome:
     """What became of an order to the laboratories."""
     answers = [
         f"{title(role)}: {'' if one.accepted else 'refused: '}{one.text}"
@@ -365,8 +367,8 @@ def outcome(given: Given) -> Outcome:
     ]
     if given.silent:
         who = " and the ".join(map(title, given.silent))
-        return Outcome(
+        return OrderOutcome(
             UNHEARD, " ".join([f"No answer came from the {who} within {PATIENCE_S:g} s.", *answers])
         )
     accepted = all(one.accepted for one in given.answers.values())
-    return Outcome(DONE if accepted else REFUSED, " ".join(answers))
+    return OrderOutcome(DONE if accepted else REFUSED, " ".join(answers))

@@ -1,4 +1,4 @@
-"""The panel's hands: orders over the operator's link to stand-ins of laboratories, and the commands that they start."""
+"""The panel's executor: orders over the link to stand-ins of laboratories, and the commands that they start."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import pytest
 from common.errors import InputError
 from common.plan.plan import Plan
 from common.plan.read import with_test
-from report.panel.desk import Outcome, Present
-from rths.panel.hands import Hands, Options
+from report.panel.desk import OrderOutcome, Present
+from rths.panel.executor import Options, PanelExecutor
 from rths.perform import operate
 from tests.processes import HANG_S
 from tests.rths.panel.stand_in import StandIn
@@ -49,19 +49,19 @@ def until(true: Callable[[], Any]) -> Any:
 
 
 class Desk:
-    """Hands whose commands are small programs."""
+    """An executor whose commands are small programs."""
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self.hands = Hands(Options(lambda: self.plan, "plan.toml", ["plan.toml"], [], []))
+        self.executor = PanelExecutor(Options(lambda: self.plan, "plan.toml", ["plan.toml"], [], []))
 
-    def give(self, word: str, digest: str = "", reason: str = "") -> Outcome:
-        return self.hands.carry_out(word, digest, reason).result(HANG_S)
+    def give(self, word: str, digest: str = "", reason: str = "") -> OrderOutcome:
+        return self.executor.carry_out(word, digest, reason).result(HANG_S)
 
 
 def modes(desk: Desk) -> dict[str, str]:
     """The modes that the laboratories of the panel's own test have reported."""
-    shown = desk.hands.snapshot.shown
+    shown = desk.executor.snapshot.shown
     return {lab: mode for lab, (mode, _) in shown.told.modes.items()} if shown else {}
 
 
@@ -70,7 +70,7 @@ def desk(short_plan: Plan, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> I
     monkeypatch.setenv("RTHS_RUNNING", str(tmp_path))
     found = Desk(with_test(short_plan, seed=77))
     yield found
-    found.hands.close()
+    found.executor.close()
 
 
 @pytest.fixture
@@ -94,15 +94,15 @@ def program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[str], 
 
 def test_an_order_reaches_every_laboratory_once_and_all_answers_are_reported(desk: Desk) -> None:
     with StandIn(desk.plan).there() as labs:
-        until(lambda: desk.hands.present.test)
-        assert desk.hands.present.digest == desk.plan.digest()
-        assert desk.give("stop") == Outcome("done", "master: running. slave: running.")
+        until(lambda: desk.executor.present.test)
+        assert desk.executor.present.digest == desk.plan.digest()
+        assert desk.give("stop") == OrderOutcome("done", "master: running. slave: running.")
         assert desk.give("start").text == "master: running."
         assert [[word for _, word in labs.presses[role]] for role in ("master", "slave")] == [
             ["stop", "start"],
             ["stop"],
         ]
-    until(lambda: desk.hands.present == Present())
+    until(lambda: desk.executor.present == Present())
 
 
 def test_lost_frames_are_repeated_and_no_order_waits_for_the_answers_to_another(
@@ -112,13 +112,13 @@ def test_lost_frames_are_repeated_and_no_order_waits_for_the_answers_to_another(
     labs = StandIn(desk.plan)
     labs.lossy = 3
     with labs.there():
-        until(lambda: desk.hands.snapshot.shown and desk.hands.snapshot.shown.reached)
-        given = [desk.hands.carry_out("stop", "", "") for _ in range(60)]
+        until(lambda: desk.executor.snapshot.shown and desk.executor.snapshot.shown.reached)
+        given = [desk.executor.carry_out("stop", "", "") for _ in range(60)]
         assert {one.result(HANG_S).state for one in given} == {"done"}
         for role in ("master", "slave"):
             assert len(labs.presses[role]) == len({press for press, _ in labs.presses[role]}) == 60
         labs.lossy, labs.deaf = 0, {"slave"}
-        slow = desk.hands.carry_out("stop", "", "")
+        slow = desk.executor.carry_out("stop", "", "")
         assert desk.give("start").state == "done"  # the master alone answers it
         assert not slow.done()
         monkeypatch.setattr(operate, "PATIENCE_S", 0.3)
@@ -132,8 +132,8 @@ def test_every_order_gets_an_outcome_when_the_test_ends(desk: Desk) -> None:
     labs = StandIn(desk.plan)
     labs.deaf = {"master", "slave"}
     with labs.there():
-        until(lambda: desk.hands.snapshot.shown and desk.hands.snapshot.shown.reached)
-        given = desk.hands.carry_out("stop", "", "")
+        until(lambda: desk.executor.snapshot.shown and desk.executor.snapshot.shown.reached)
+        given = desk.executor.carry_out("stop", "", "")
     assert given.result(HANG_S).state == "not heard"
 
 
@@ -146,23 +146,23 @@ def test_arming_starts_a_run_command_and_reports_when_all_laboratories_are_armed
     )
     assert calls == [["run", "plan.toml", "--await-start", "--reports"]]
     until(lambda: modes(desk) == {"master": "armed", "slave": "armed"})
-    assert desk.hands.snapshot.shown is not None
-    assert desk.hands.snapshot.shown.own
+    assert desk.executor.snapshot.shown is not None
+    assert desk.executor.snapshot.shown.own
     assert desk.give("arm", desk.plan.digest()).text == "A test runs already."
     assert "would disturb" in desk.give("check").text
     assert (
         desk.give("stop").state == "done"
     )  # its laboratories are not linked, so that the command is interrupted
-    until(lambda: desk.hands.snapshot.shown is None)
-    assert desk.hands.snapshot.last == (("the test's command", "Stopped by SIGINT."),)
+    until(lambda: desk.executor.snapshot.shown is None)
+    assert desk.executor.snapshot.last == (("the test's command", "Stopped by SIGINT."),)
 
 
 def test_a_command_that_ends_before_all_are_armed_gives_its_reason(
     desk: Desk, program: Callable[[str], list[list[str]]]
 ) -> None:
     program(RUN.replace("ENDING", REFUSED))
-    assert desk.give("arm", desk.plan.digest()) == Outcome("refused", "The door is open.")
-    assert desk.hands.snapshot.last == (("slave", "The door is open."),)
+    assert desk.give("arm", desk.plan.digest()) == OrderOutcome("refused", "The door is open.")
+    assert desk.executor.snapshot.last == (("slave", "The door is open."),)
 
 
 def test_a_plan_that_has_changed_or_is_missing_is_not_armed(
@@ -176,8 +176,8 @@ def test_a_plan_that_has_changed_or_is_missing_is_not_armed(
     def gone() -> Plan:
         raise InputError("There is no plan.")
 
-    monkeypatch.setattr(desk.hands, "_options", desk.hands._options._replace(load=gone))
-    assert desk.give("arm", shown) == Outcome("refused", "There is no plan.")
+    monkeypatch.setattr(desk.executor, "_options", desk.executor._options._replace(load=gone))
+    assert desk.give("arm", shown) == OrderOutcome("refused", "There is no plan.")
     assert calls == []
 
 
@@ -185,34 +185,38 @@ def test_a_test_with_another_plan_than_the_checked_one_is_ended_before_anything_
     desk: Desk, program: Callable[[str], list[list[str]]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program(RUN.replace("ENDING", ""))
-    arming = desk.hands.carry_out("arm", desk.plan.digest(), "")
-    own = until(lambda: desk.hands.snapshot.shown)
+    arming = desk.executor.carry_out("arm", desk.plan.digest(), "")
+    own = until(lambda: desk.executor.snapshot.shown)
     other = StandIn(with_test(desk.plan, seed=79))
     monkeypatch.setattr("common.host.running.os.getpid", lambda: int(own.test.rpartition("-")[2]))
     with other.there():
         assert "the test is ended before anything moves" in arming.result(HANG_S).text
-        until(lambda: desk.hands.snapshot.last)
+        until(lambda: desk.executor.snapshot.last)
 
 
 @pytest.mark.parametrize(
     ("text", "outcome", "complaint"),
     [
-        ('print(\'{"digest": "d"}\')', Outcome("done", "See what was found."), ""),
-        ('import sys; sys.exit("rths: no such key.")', Outcome("refused", "no such key."), "no such key."),
-        ("", Outcome("refused", "The check ended without a word."), "The check ended without a word."),
+        ('print(\'{"digest": "d"}\')', OrderOutcome("done", "See what was found."), ""),
+        (
+            'import sys; sys.exit("rths: no such key.")',
+            OrderOutcome("refused", "no such key."),
+            "no such key.",
+        ),
+        ("", OrderOutcome("refused", "The check ended without a word."), "The check ended without a word."),
     ],
 )
 def test_a_check_of_the_plan_runs_the_check_command(
-    text: str, outcome: Outcome, complaint: str, desk: Desk, program: Callable[[str], list[list[str]]]
+    text: str, outcome: OrderOutcome, complaint: str, desk: Desk, program: Callable[[str], list[list[str]]]
 ) -> None:
     calls = program(text)
     assert desk.give("check") == outcome
     assert calls == [["check", "plan.toml", "--json"]]
-    assert desk.hands.snapshot.plan.complaint == complaint
-    assert desk.hands.present.armable == ("d" if not complaint else "")
+    assert desk.executor.snapshot.plan.complaint == complaint
+    assert desk.executor.present.armable == ("d" if not complaint else "")
 
 
-def test_if_the_panels_hands_fail_every_order_still_gets_an_outcome(
+def test_if_the_panels_executor_fails_every_order_still_gets_an_outcome(
     desk: Desk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     failed: list[object] = []
@@ -221,8 +225,8 @@ def test_if_the_panels_hands_fail_every_order_still_gets_an_outcome(
     def fail() -> None:
         raise RuntimeError
 
-    monkeypatch.setattr(desk.hands, "_seek", fail)
-    given = [desk.hands.carry_out("stop", "", "") for _ in range(20)]
+    monkeypatch.setattr(desk.executor, "_seek", fail)
+    given = [desk.executor.carry_out("stop", "", "") for _ in range(20)]
     assert {one.result(HANG_S).state for one in given} == {"not heard"}
     assert desk.give("stop").text.startswith("This part of the panel has ended")
     assert len(failed) == 1
@@ -233,15 +237,15 @@ def test_a_panel_that_ends_stops_an_armed_test_and_leaves_a_running_one(
 ) -> None:
     program(RUN.replace("ENDING", READY))
     desk.give("arm", desk.plan.digest())
-    assert "was not started, and is asked to end" in desk.hands.close()
-    until(lambda: desk.hands._command and desk.hands._command.over)
-    assert desk.hands.close() == ""
+    assert "was not started, and is asked to end" in desk.executor.close()
+    until(lambda: desk.executor._command and desk.executor._command.over)
+    assert desk.executor.close() == ""
     running = Desk(desk.plan)
     program(RUN.replace("ENDING", READY + '\nsay(kind="mode", lab="master", mode="running")'))
     running.give("arm", desk.plan.digest())
-    command = until(lambda: running.hands._command)
+    command = until(lambda: running.executor._command)
     until(lambda: command.told.modes["master"][0] == "running")
-    assert "goes on as planned" in running.hands.close()
+    assert "goes on as planned" in running.executor.close()
     assert not command.over
     command.interrupt()
     until(lambda: command.over)
