@@ -9,7 +9,7 @@ from report.page import frame, render
 from report.text.formats import percent, quantity
 from simulation.campaign.course import endured, of
 from simulation.campaign.goal import BY_HAND, REAL_TIME, VIRTUAL, Goal
-from simulation.campaign.steps import Diagnosed, PlayedStep, Step
+from simulation.campaign.steps import DiagnosedStep, PlayedStep, Step
 
 SAID = (
     "Before each test every candidate is simulated in the laboratories as found so far, under each plausible cause. "
@@ -31,7 +31,7 @@ def page(goal: Goal, steps: Sequence[Step]) -> str:
         said=SAID,
         tests=tables.overview(goal, steps),
         files=[(one.file, diagnoses(goal, one.test)) for one in every],
-        probabilities=pictures.probabilities(steps) if of(steps, Diagnosed) else None,
+        probabilities=pictures.probabilities(steps) if of(steps, DiagnosedStep) else None,
         causes=tables.causes(steps),
         choices=list(
             zip(

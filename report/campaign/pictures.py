@@ -12,7 +12,7 @@ from report.pictures import figure
 from report.run.drawing import INCH, DrawnPicture
 from simulation.campaign.choice import named
 from simulation.campaign.course import of
-from simulation.campaign.steps import Diagnosed, Step
+from simulation.campaign.steps import DiagnosedStep, Step
 
 HIGH = 2.8  # inches
 CURVES = 6  # causes with a curve: the most probable ones, for which there are colours
@@ -20,7 +20,7 @@ CURVES = 6  # causes with a curve: the most probable ones, for which there are c
 
 def probabilities(steps: Sequence[Step]) -> DrawnPicture:
     """The probability of each cause after each test."""
-    every = of(steps, Diagnosed)
+    every = of(steps, DiagnosedStep)
     names = list(dict.fromkeys(cause.effects for one in every for cause in one.causes))
     names.sort(key=lambda effects: -max(moved(every, effects)))
 

@@ -11,14 +11,14 @@ from simulation.campaign.choice import named
 from simulation.campaign.course import of
 from simulation.campaign.goal import Goal
 from simulation.campaign.steps import (
-    Begun,
-    Cause,
-    Decided,
-    Diagnosed,
-    Ended,
-    Interrupted,
+    BegunStep,
+    DecidedStep,
+    DiagnosedStep,
+    EndedStep,
+    InterruptedStep,
     Option,
     PlayedStep,
+    PossibleCause,
     Step,
 )
 
@@ -29,19 +29,19 @@ LISTED = 12  # candidates in a table of the page, those that tell most
 class TestOfCampaign(NamedTuple):
     """A test with all that the log holds on it."""
 
-    decided: Decided
+    decided: DecidedStep
     options: tuple[Option, ...]  # of the choice that made it
     played: PlayedStep | None = None
-    diagnosed: Diagnosed | None = None
+    diagnosed: DiagnosedStep | None = None
 
 
 def tests(steps: Sequence[Step]) -> list[TestOfCampaign]:
     """The tests in their order."""
     played = {one.test: one for one in of(steps, PlayedStep)}
-    said = {one.test: one for one in of(steps, Diagnosed)}
-    begun = of(steps, Begun)
+    said = {one.test: one for one in of(steps, DiagnosedStep)}
+    begun = of(steps, BegunStep)
     found = []
-    for one in of(steps, Decided):
+    for one in of(steps, DecidedStep):
         before = said.get(one.test - 1)
         options = before.options if before else begun[0].options
         found.append(TestOfCampaign(one, options, played.get(one.test), said.get(one.test)))
@@ -57,7 +57,7 @@ def lines(goal: Goal, steps: Sequence[Step]) -> Iterator[str]:
             yield f"  played: {one.played.outcome}, {strained(one.played)}"
         if one.diagnosed:
             yield f"  found: {said(one.diagnosed)}"
-    for cut in of(steps, Interrupted):
+    for cut in of(steps, InterruptedStep):
         yield f"test {cut.test} was interrupted once: {strained(cut)}; its recording is {cut.file}"
     yield ending(goal, steps)
 
@@ -65,21 +65,21 @@ def lines(goal: Goal, steps: Sequence[Step]) -> Iterator[str]:
 def ending(goal: Goal, steps: Sequence[Step]) -> str:
     """How the campaign ended, or what a person has to do next."""
     last = steps[-1]
-    if isinstance(last, Ended):
+    if isinstance(last, EndedStep):
         return last.text
-    test = of(steps, Decided)[-1]
+    test = of(steps, DecidedStep)[-1]
     return (
         f"Play test {test.test}, whose plan is test-{test.test:02d}.toml, and give its recording with --played to the "
         "same command."
     )
 
 
-def strained(one: PlayedStep | Interrupted) -> str:
+def strained(one: PlayedStep | InterruptedStep) -> str:
     """What a test did to the specimens."""
     return f"drift {quantity(one.drift, 'm')}, {quantity(one.energy, 'J')} absorbed"
 
 
-def said(one: Diagnosed) -> str:
+def said(one: DiagnosedStep) -> str:
     """Status, gap and causes of a diagnosis."""
     causes = ", ".join(f"{named(each.effects)} {percent(each.probability)}" for each in one.causes[:SHOWN])
     return f"{one.status.replace('_', ' ')}, {percent(one.gap)} of gap left; {causes}"
@@ -89,7 +89,7 @@ def overview(goal: Goal, steps: Sequence[Step]) -> TitledTable:
     """A row for each test."""
     rows = []
     for one in tests(steps):
-        top = one.diagnosed.causes[0] if one.diagnosed else Cause((), 0.0)
+        top = one.diagnosed.causes[0] if one.diagnosed else PossibleCause((), 0.0)
         rows.append(
             [
                 str(one.decided.test),
@@ -137,7 +137,7 @@ def choices(goal: Goal, one: TestOfCampaign) -> TitledTable:
 
 def causes(steps: Sequence[Step]) -> TitledTable:
     """How the probabilities of the causes moved from test to test."""
-    every = of(steps, Diagnosed)
+    every = of(steps, DiagnosedStep)
     names = list(dict.fromkeys(cause.effects for one in every for cause in one.causes))
     rows = [
         [named(effects), *(percent(chance) if chance else "–" for chance in moved(every, effects))]
@@ -150,6 +150,6 @@ def causes(steps: Sequence[Step]) -> TitledTable:
 LEAST = 0.005  # probability that a cause must have once to be listed: below, it is never worth a test
 
 
-def moved(every: Sequence[Diagnosed], effects: tuple[str, ...]) -> list[float]:
+def moved(every: Sequence[DiagnosedStep], effects: tuple[str, ...]) -> list[float]:
     """The probability of a cause after each test, 0 where it was not among the causes."""
     return [sum(cause.probability for cause in one.causes if cause.effects == effects) for one in every]

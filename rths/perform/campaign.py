@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         steps = gone_on(args, goal, play, folder, progress)
         progress.tell("page")
         texts = written(goal, steps, folder)
-    from simulation.campaign.steps import Decided, Ended, plain
+    from simulation.campaign.steps import DecidedStep, EndedStep, plain
 
     last = steps[-1]
     if args.json:
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         sys.stdout.writelines(f"{text}\n" for text in texts)
         sys.stdout.write(f"page: {folder / PAGE}\n")
-    reached = isinstance(last, Decided) or (isinstance(last, Ended) and last.outcome in REACHED)
+    reached = isinstance(last, DecidedStep) or (isinstance(last, EndedStep) and last.outcome in REACHED)
     return 0 if reached else 1
 
 
@@ -155,10 +155,10 @@ def gone_on(args: argparse.Namespace, goal: Goal, play: Play, folder: Path, prog
 def given(recording: Path, steps: Sequence[Step], work: CampaignActions, folder: Path) -> None:
     """Take the recording of the test that is next into the folder; raises InputError where none is awaited."""
     from simulation.campaign import actions
-    from simulation.campaign.steps import Decided
+    from simulation.campaign.steps import DecidedStep
 
     last = steps[-1] if steps else None
-    if not isinstance(last, Decided):
+    if not isinstance(last, DecidedStep):
         raise InputError(f"The campaign in {folder} awaits no test: leave out --played.")
     actions.take(recording, last, folder, work.plan(last))
 

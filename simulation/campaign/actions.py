@@ -25,7 +25,14 @@ from diagnosis.recorded import record
 from diagnosis.recorded.slips import refuse_slips
 from simulation.campaign import assess, choice, strain
 from simulation.campaign.goal import REAL_TIME, Goal, plan_of
-from simulation.campaign.steps import Begun, Decided, Diagnosed, Endured, Interrupted, PlayedStep
+from simulation.campaign.steps import (
+    BegunStep,
+    DecidedStep,
+    DiagnosedStep,
+    Endured,
+    InterruptedStep,
+    PlayedStep,
+)
 from simulation.workers.parts import synced
 from simulation.workers.versions import versions
 
@@ -45,15 +52,15 @@ class CampaignActions:
         self._goal, self._folder = goal, folder
         self._play, self._keep, self._tell = play, keep, tell
 
-    def begin(self) -> Begun:
+    def begin(self) -> BegunStep:
         """The candidates as the nominal models predict them."""
-        return Begun(self._goal.digest, versions(), assess.nominal(self._goal))
+        return BegunStep(self._goal.digest, versions(), assess.nominal(self._goal))
 
-    def plan(self, decided: Decided) -> Plan:
+    def plan(self, decided: DecidedStep) -> Plan:
         """The plan of a test."""
         return plan_of(self._goal, decided.candidate, decided.test)
 
-    def interrupted(self, decided: Decided) -> Sequence[Interrupted]:
+    def interrupted(self, decided: DecidedStep) -> Sequence[InterruptedStep]:
         """The recordings of a test in real time whose program was ended; each gets a name by which it is kept.
 
         In virtual time there are none, because the same test gives the same recording again.
@@ -64,13 +71,13 @@ class CampaignActions:
             half.rename(self._folder / f"{name(decided.test)}-interrupted-{count + 1}.mcap")
         found = sorted(self._folder.glob(f"{name(decided.test)}-interrupted-*.mcap"))
         plan = self.plan(decided)
-        return [Interrupted(decided.test, path.name, *strain.of_run(plan, read(path))) for path in found]
+        return [InterruptedStep(decided.test, path.name, *strain.of_run(plan, read(path))) for path in found]
 
     def half(self, test: int) -> Path:
         """The file of a test that has not reached its end."""
         return self._folder / f"{UNFINISHED}{name(test)}.mcap"
 
-    def play(self, decided: Decided) -> PlayedStep | None:
+    def play(self, decided: DecidedStep) -> PlayedStep | None:
         """Play a test, unless its recording is there already."""
         path, plan = self._folder / f"{name(decided.test)}.mcap", self.plan(decided)
         outputs.write_text(path.with_suffix(".toml"), plan.toml(), force=True)
@@ -85,7 +92,7 @@ class CampaignActions:
         ended = outcome(run.metadata.get("summary", {}))
         return PlayedStep(decided.test, path.name, digest_of(path), ended, *strain.of_run(plan, run))
 
-    def diagnose(self, played: Sequence[PlayedStep], endured: Endured) -> Diagnosed:
+    def diagnose(self, played: Sequence[PlayedStep], endured: Endured) -> DiagnosedStep:
         """Diagnose all tests together, the one with the largest drift first, whose gap stands out most."""
         order = sorted(played, key=lambda one: (-one.drift, one.test))
         for one in order:
@@ -98,7 +105,7 @@ class CampaignActions:
         reports = [one.report for one in judged.values()]
         known = assess.knowledge({role: one.found for role, one in judged.items()})
         causes = known.causes()[: assess.LISTED]
-        said = Diagnosed(
+        said = DiagnosedStep(
             test,
             path.name,
             versions(),
@@ -172,7 +179,7 @@ def refuse_other(plan: Plan, run: Run) -> None:
             )
 
 
-def take(recording: Path, decided: Decided, folder: Path, plan: Plan) -> None:
+def take(recording: Path, decided: DecidedStep, folder: Path, plan: Plan) -> None:
     """Copy a recording that a person made of a test into the campaign's folder.
 
     Raises:

@@ -17,10 +17,10 @@ from loop.nominal import limited
 from loop.signals import by_role
 from models.registry import Array
 from models.system import System
-from simulation.campaign import foretold, hypotheses, information, strain
+from simulation.campaign import expected, hypotheses, information, strain
 from simulation.campaign.goal import CampaignTest, Goal, plan_of
 from simulation.campaign.information import Expected
-from simulation.campaign.steps import Cause, Endured, Option
+from simulation.campaign.steps import Endured, Option, PossibleCause
 
 Found = Mapping[str, Diagnosis]  # by role of the slave
 
@@ -42,7 +42,7 @@ def nominal(goal: Goal) -> tuple[Option, ...]:
     """The candidates before the first test, as the plan's nominal models predict them."""
     return tuple(
         judged(
-            goal, one.number, plan, [foretold.rolled_out(plan, foretold.laboratories({}, plan))], Endured()
+            goal, one.number, plan, [expected.rolled_out(plan, expected.laboratories({}, plan))], Endured()
         )
         for one, plan in tests(goal, 1)
     )
@@ -54,16 +54,16 @@ def tests(goal: Goal, test: int) -> Iterator[tuple[CampaignTest, Plan]]:
         yield one, plan_of(goal, one.number, test)
 
 
-def knowledge(found: Found) -> Named | Hidden:
+def knowledge(found: Found) -> NamedState | HiddenState:
     """What the diagnosis of all tests so far says of the cause."""
-    return Named(found) if hypotheses.open_parts(found) or in_samples(found) else Hidden(found)
+    return NamedState(found) if hypotheses.open_parts(found) or in_samples(found) else HiddenState(found)
 
 
-def assessed(goal: Goal, known: Named | Hidden, test: int, endured: Endured) -> Assessment:
+def assessed(goal: Goal, known: NamedState | HiddenState, test: int, endured: Endured) -> Assessment:
     """What each candidate would add to what is known, as the test of this number."""
     options, apart = [], []
     for one, plan in tests(goal, test):
-        rollouts = [foretold.rolled_out(plan, systems) for systems in known.plausible(plan)]
+        rollouts = [expected.rolled_out(plan, systems) for systems in known.plausible(plan)]
         option = judged(goal, one.number, plan, rollouts, endured)
         if rollouts[0].finite:
             expected, distances = known.told(plan, rollouts[0])
@@ -109,7 +109,7 @@ def beyond(plan: Plan, rollout: Rollout, more: float) -> str:
     return ""
 
 
-class Named:
+class NamedState:
     """The state in which the gap of one part at least has causes to choose between."""
 
     def __init__(self, found: Found) -> None:
@@ -125,18 +125,18 @@ class Named:
         for places in islice(product(*kept), MOST_PLAUSIBLE):
             found = self.found
             for part, place in zip(self.parts, places, strict=True):
-                found = foretold.exchanged(found, part, part.fits[place]) if place else found
-            yield foretold.laboratories(found, plan)
+                found = expected.exchanged(found, part, part.fits[place]) if place else found
+            yield expected.laboratories(found, plan)
 
     def told(self, plan: Plan, rollout: Rollout) -> tuple[Expected, list[Array]]:
         """What a test tells, and how far apart it moves the causes of each part."""
-        seen = {role: foretold.parts(plan, rollout, role) for role in self.found}
+        seen = {role: expected.parts(plan, rollout, role) for role in self.found}
         rows = []
         for part in self.parts:
             there = seen[part.role].get(part.title)
             count = len(part.fits)
             none = (Expected(0.0, float(part.weights[0])), np.zeros((count, count)))
-            rows.append(none if there is None else foretold.told(part, there))
+            rows.append(none if there is None else expected.told(part, there))
         return information.together([one for one, _ in rows]), [apart for _, apart in rows]
 
     def names(self, places: Sequence[int]) -> tuple[str, ...]:
@@ -162,17 +162,17 @@ class Named:
         names = [self.names(chosen) for chosen in islice(product(*places), LISTED)]
         return tuple(dict.fromkeys(names)), chance
 
-    def causes(self) -> tuple[Cause, ...]:
+    def causes(self) -> tuple[PossibleCause, ...]:
         """The causes of all parts together, the most probable first."""
         rows = []
         for chosen in product(*(range(len(part.fits)) for part in self.parts)):
             pairs = zip(self.parts, chosen, strict=True)
             chance = float(np.prod([part.sure * part.weights[place] for part, place in pairs]))
-            rows.append(Cause(self.names(chosen), chance))
+            rows.append(PossibleCause(self.names(chosen), chance))
         return tuple(sorted(rows, key=lambda one: -one.probability))
 
 
-class Hidden:
+class HiddenState:
     """The state in which no part has a gap: something may still be there that the tests could not show."""
 
     def __init__(self, found: Found) -> None:
@@ -181,25 +181,25 @@ class Hidden:
 
     def plausible(self, plan: Plan) -> Iterator[Mapping[str, System]]:
         """The laboratories as found; each hidden cause by itself is too improbable to be reckoned with."""
-        yield foretold.laboratories(self.found, plan)
+        yield expected.laboratories(self.found, plan)
 
     def told(self, plan: Plan, rollout: Rollout) -> tuple[Expected, list[Array]]:
         """What a test tells of the hidden causes."""
-        seen = {role: foretold.parts(plan, rollout, role) for role in self.found}
+        seen = {role: expected.parts(plan, rollout, role) for role in self.found}
         there = [
             seen[role].get(fit.data.part.name)
             for role, fit in zip(self.hidden.roles, self.hidden.fits, strict=True)
         ]
-        return foretold.shown(self.hidden, there), []
+        return expected.shown(self.hidden, there), []
 
     def inseparable(self, _apart: Sequence[Sequence[Array]]) -> tuple[tuple[tuple[str, ...], ...], float]:
         """That nothing is there."""
         return ((),), self.hidden.nothing
 
-    def causes(self) -> tuple[Cause, ...]:
+    def causes(self) -> tuple[PossibleCause, ...]:
         """Nothing, and the hidden causes by their effects."""
         chances: dict[str, float] = {}
         for cause, weight in zip(self.hidden.causes, self.hidden.weights[1:], strict=True):
             chances[cause.name] = chances.get(cause.name, 0.0) + float(weight)
-        rows = [Cause((name,), chance) for name, chance in chances.items()]
-        return (Cause((), self.hidden.nothing), *sorted(rows, key=lambda one: -one.probability))
+        rows = [PossibleCause((name,), chance) for name, chance in chances.items()]
+        return (PossibleCause((), self.hidden.nothing), *sorted(rows, key=lambda one: -one.probability))

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from simulation.campaign.goal import GoalTable
-from simulation.campaign.steps import Begun, Decided, Diagnosed, Ended, Option, Step
+from simulation.campaign.steps import BegunStep, DecidedStep, DiagnosedStep, EndedStep, Option, Step
 
-Choice = Callable[[Sequence[Step]], Decided | Ended]
+Choice = Callable[[Sequence[Step]], DecidedStep | EndedStep]
 Pick = Callable[
     [Sequence[Option], int], Option
 ]  # of the options that may be played, for the test of a number
@@ -55,68 +55,72 @@ def choosing(head: GoalTable, pick: Pick = best) -> Choice:
     return partial(choose, head, pick)
 
 
-def choose(head: GoalTable, pick: Pick, steps: Sequence[Step]) -> Decided | Ended:
+def choose(head: GoalTable, pick: Pick, steps: Sequence[Step]) -> DecidedStep | EndedStep:
     """The next test after the steps of a log, which end with `Begun` or `Diagnosed`, or the end."""
     last = steps[-1]
-    if isinstance(last, Begun):
+    if isinstance(last, BegunStep):
         return first(last)
-    assert isinstance(last, Diagnosed)  # noqa: S101 - no other step asks for a choice
+    assert isinstance(last, DiagnosedStep)  # noqa: S101 - no other step asks for a choice
     return end(head, last) or following(pick, steps, last)
 
 
-def first(begun: Begun) -> Decided | Ended:
+def first(begun: BegunStep) -> DecidedStep | EndedStep:
     """The first test: nothing is known yet of the laboratories, so it is the one with the smallest drift."""
     left = [one for one in begun.options if not one.refused]
     if not left:
         return none_left(begun.options)
     chosen = min(left, key=lambda one: (one.drift, one.candidate))
-    return Decided(1, chosen.candidate, 0.0, "The first test is the one with the smallest drift.")
+    return DecidedStep(1, chosen.candidate, 0.0, "The first test is the one with the smallest drift.")
 
 
-def end(head: GoalTable, last: Diagnosed) -> Ended | None:
+def end(head: GoalTable, last: DiagnosedStep) -> EndedStep | None:
     """The end that a diagnosis makes; None where another test is asked for."""
     if head.gap > 0.0 and last.gap <= head.gap:
-        return Ended(
+        return EndedStep(
             GAP,
             f"The gap that is left, {100.0 * last.gap:.2g} %, is within the {100.0 * head.gap:.2g} % asked for.",
         )
     top = last.causes[0]
     if top.probability >= head.certain:
-        return Ended(CERTAIN, f"The cause is certain: {named(top.effects)}, with {percent(top.probability)}.")
+        return EndedStep(
+            CERTAIN, f"The cause is certain: {named(top.effects)}, with {percent(top.probability)}."
+        )
     if len(last.same) > 1 and last.together >= head.certain:
-        return Ended(
+        return EndedStep(
             INSEPARABLE,
             f"No test within these limits can tell {' from '.join(map(named, last.same))}; one of them is the cause, "
             f"with {percent(last.together)}.",
         )
     if last.test >= head.tests:
-        return Ended(TESTS, f"All {head.tests} tests are played; the most probable cause is {likely(last)}.")
+        return EndedStep(
+            TESTS, f"All {head.tests} tests are played; the most probable cause is {likely(last)}."
+        )
     return None
 
 
-def following(pick: Pick, steps: Sequence[Step], last: Diagnosed) -> Decided | Ended:
+def following(pick: Pick, steps: Sequence[Step], last: DiagnosedStep) -> DecidedStep | EndedStep:
     """The next test, or the end where none may be played or none tells anything."""
-    played = {one.candidate for one in steps if isinstance(one, Decided)}
+    played = {one.candidate for one in steps if isinstance(one, DecidedStep)}
     new = [one for one in last.options if one.candidate not in played]
     left = [one for one in new if not one.refused]
     if not left:
         return none_left(new)
     if max(one.bits for one in left) < LEAST:
-        return Ended(
+        return EndedStep(
             SILENT,
             "No test within these limits tells more about the cause than is known; the most probable one is "
             f"{likely(last)}.",
         )
     chosen = pick(left, last.test + 1)
-    return Decided(last.test + 1, chosen.candidate, chosen.bits, reason(chosen, left))
+    return DecidedStep(last.test + 1, chosen.candidate, chosen.bits, reason(chosen, left))
 
 
-def none_left(options: Sequence[Option]) -> Ended:
+def none_left(options: Sequence[Option]) -> EndedStep:
     """The end where no candidate may be played."""
     reasons = sorted({one.refused for one in options})
     if not reasons:
-        return Ended(LIMITS, "Every test of the list is played.")
-    return Ended(LIMITS, f"No test of the list is left within the limits: {'; '.join(reasons)}.")
+        return EndedStep(LIMITS, "Every test of the list is played.")
+    return EndedStep(LIMITS, f"No test of the list is left within the limits: {'; '.join(reasons)}.")
 
 
 def reason(chosen: Option, left: Sequence[Option]) -> str:
@@ -131,7 +135,7 @@ def reason(chosen: Option, left: Sequence[Option]) -> str:
     return f"{text}, the most of {len(left)} tests within the limits."
 
 
-def likely(last: Diagnosed) -> str:
+def likely(last: DiagnosedStep) -> str:
     """The most probable cause with its probability."""
     return f"{named(last.causes[0].effects)}, with {percent(last.causes[0].probability)}"
 

@@ -7,8 +7,17 @@ from typing import Protocol, TypeVar
 
 from common.errors import InputError
 from simulation.campaign.choice import Choice
-from simulation.campaign.log import Log
-from simulation.campaign.steps import Begun, Decided, Diagnosed, Ended, Endured, Interrupted, PlayedStep, Step
+from simulation.campaign.log import CampaignLog
+from simulation.campaign.steps import (
+    BegunStep,
+    DecidedStep,
+    DiagnosedStep,
+    EndedStep,
+    Endured,
+    InterruptedStep,
+    PlayedStep,
+    Step,
+)
 
 Kind = TypeVar("Kind", bound=Step)
 
@@ -19,16 +28,16 @@ class Actions(Protocol):
     Each method may be called again for a step that was interrupted; it then goes on with the files that are there.
     """
 
-    def begin(self) -> Begun:
+    def begin(self) -> BegunStep:
         """The candidates as the nominal models predict them."""
 
-    def interrupted(self, decided: Decided) -> Sequence[Interrupted]:
+    def interrupted(self, decided: DecidedStep) -> Sequence[InterruptedStep]:
         """The recordings of a test that did not reach its end."""
 
-    def play(self, decided: Decided) -> PlayedStep | None:
+    def play(self, decided: DecidedStep) -> PlayedStep | None:
         """Play a test; None where a person still has to play it."""
 
-    def diagnose(self, played: Sequence[PlayedStep], endured: Endured) -> Diagnosed:
+    def diagnose(self, played: Sequence[PlayedStep], endured: Endured) -> DiagnosedStep:
         """Diagnose all tests so far together."""
 
 
@@ -38,8 +47,8 @@ def of(steps: Sequence[Step], kind: type[Kind]) -> list[Kind]:
 
 
 def go_on(
-    log: Log, actions: Actions, choose: Choice, tell: Callable[[Step], None] = lambda _: None
-) -> Ended | Decided:
+    log: CampaignLog, actions: Actions, choose: Choice, tell: Callable[[Step], None] = lambda _: None
+) -> EndedStep | DecidedStep:
     """Go on with a campaign until it ends; the test that was decided where a person has to play it.
 
     Raises:
@@ -47,11 +56,11 @@ def go_on(
     """
     while True:
         last = log.steps[-1] if log.steps else None
-        if isinstance(last, Ended):
+        if isinstance(last, EndedStep):
             return last
         made = next_step(log.steps, actions, choose)
         if made is None:
-            return of(log.steps, Decided)[-1]
+            return of(log.steps, DecidedStep)[-1]
         log.append(made)
         tell(made)
 
@@ -61,11 +70,11 @@ def next_step(steps: Sequence[Step], actions: Actions, choose: Choice) -> Step |
     if not steps:
         return actions.begin()
     last = steps[-1]
-    if isinstance(last, Begun | Diagnosed):
+    if isinstance(last, BegunStep | DiagnosedStep):
         return choose(steps)
-    if isinstance(last, Decided | Interrupted):
-        decided = of(steps, Decided)[-1]
-        known = {one.file for one in of(steps, Interrupted)}
+    if isinstance(last, DecidedStep | InterruptedStep):
+        decided = of(steps, DecidedStep)[-1]
+        known = {one.file for one in of(steps, InterruptedStep)}
         new = [one for one in actions.interrupted(decided) if one.file not in known]
         return new[0] if new else actions.play(decided)
     return actions.diagnose(of(steps, PlayedStep), endured(steps))
@@ -73,13 +82,13 @@ def next_step(steps: Sequence[Step], actions: Actions, choose: Choice) -> Step |
 
 def endured(steps: Sequence[Step]) -> Endured:
     """What the specimens have been through in all tests, those that were interrupted included."""
-    rows = [one for one in steps if isinstance(one, PlayedStep | Interrupted)]
+    rows = [one for one in steps if isinstance(one, PlayedStep | InterruptedStep)]
     return Endured(max((one.drift for one in rows), default=0.0), sum(one.energy for one in rows))
 
 
 def check(steps: Sequence[Step], goal: str) -> None:
     """Raise InputError where a log is that of another campaign; `goal` is the digest of this one."""
-    begun = of(steps, Begun)
+    begun = of(steps, BegunStep)
     if begun and begun[0].goal != goal:
         raise InputError(
             "The folder holds a campaign with another plan, other candidates, limits or another goal: give another "

@@ -20,7 +20,7 @@ from simulation.workers.parts import synced
 LOG = "log.jsonl"
 
 
-class Log:
+class CampaignLog:
     """The steps so far, and the file to which further ones are appended."""
 
     def __init__(self, file: BinaryIO, found: list[Step]) -> None:
@@ -36,7 +36,7 @@ class Log:
 
 
 @contextlib.contextmanager
-def opened(folder: Path) -> Iterator[Log]:
+def opened(folder: Path) -> Iterator[CampaignLog]:
     """The log in a folder, held against other processes within the context.
 
     Raises:
@@ -60,7 +60,7 @@ def opened(folder: Path) -> Iterator[Log]:
             file.truncate(len(whole) + 1 if whole else 0)
             file.seek(0, os.SEEK_END)
         synced(folder)
-        yield Log(file, read(whole, path))
+        yield CampaignLog(file, read(whole, path))
 
 
 def read(text: bytes, path: Path) -> list[Step]:

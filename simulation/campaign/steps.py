@@ -28,7 +28,7 @@ class Option:
 
 
 @dataclass(frozen=True)
-class Cause:
+class PossibleCause:
     """What may explain the gap, with its probability; no effects: nothing does."""
 
     effects: tuple[str, ...]
@@ -36,7 +36,7 @@ class Cause:
 
 
 @dataclass(frozen=True)
-class Begun:
+class BegunStep:
     """The campaign began; the candidates as the nominal models predict them."""
 
     step: ClassVar[str] = "begun"
@@ -46,7 +46,7 @@ class Begun:
 
 
 @dataclass(frozen=True)
-class Decided:
+class DecidedStep:
     """A test was chosen."""
 
     step: ClassVar[str] = "decided"
@@ -57,7 +57,7 @@ class Decided:
 
 
 @dataclass(frozen=True)
-class Interrupted:
+class InterruptedStep:
     """A test in real time did not reach its end because this program was ended; what its recording holds."""
 
     step: ClassVar[str] = "interrupted"
@@ -81,7 +81,7 @@ class PlayedStep:
 
 
 @dataclass(frozen=True)
-class Diagnosed:
+class DiagnosedStep:
     """All tests so far were diagnosed together, and the candidates judged by what they would tell."""
 
     step: ClassVar[str] = "diagnosed"
@@ -90,7 +90,7 @@ class Diagnosed:
     version: str
     status: str
     gap: float  # the largest that is left in a part
-    causes: tuple[Cause, ...]  # of all parts together, the most probable first
+    causes: tuple[PossibleCause, ...]  # of all parts together, the most probable first
     # The most probable cause, and with it those that no candidate within the limits would tell from it.
     same: tuple[tuple[str, ...], ...]
     together: float  # probability that one of `same` is true
@@ -103,7 +103,7 @@ class Diagnosed:
 
 
 @dataclass(frozen=True)
-class Ended:
+class EndedStep:
     """The campaign ended."""
 
     step: ClassVar[str] = "ended"
@@ -111,9 +111,9 @@ class Ended:
     text: str
 
 
-Step = Begun | Decided | Interrupted | PlayedStep | Diagnosed | Ended
+Step = BegunStep | DecidedStep | InterruptedStep | PlayedStep | DiagnosedStep | EndedStep
 KINDS: Mapping[str, type[Any]] = {
-    one.step: one for one in (Begun, Decided, Interrupted, PlayedStep, Diagnosed, Ended)
+    one.step: one for one in (BegunStep, DecidedStep, InterruptedStep, PlayedStep, DiagnosedStep, EndedStep)
 }
 
 
@@ -145,7 +145,7 @@ def _of(name: str, value: Any) -> Any:
     if name == "options":
         return tuple(Option(**one) for one in value)
     if name == "causes":
-        return tuple(Cause(tuple(one["effects"]), one["probability"]) for one in value)
+        return tuple(PossibleCause(tuple(one["effects"]), one["probability"]) for one in value)
     if name == "same":
         return tuple(tuple(one) for one in value)
     return value

@@ -20,7 +20,7 @@ from diagnosis.findings.report import Judged
 from simulation.campaign import actions, choice, course, log
 from simulation.campaign.choice import CERTAIN, INSEPARABLE, Pick
 from simulation.campaign.goal import Goal
-from simulation.campaign.steps import Decided, Diagnosed, Ended, Step
+from simulation.campaign.steps import DecidedStep, DiagnosedStep, EndedStep, Step
 from simulation.workers.pool import spread
 from validation.blind.cases.case import Case, reality
 from validation.blind.cases.names import CaseNames
@@ -111,8 +111,8 @@ def laboratories(case: Case, plan: Plan, test: int) -> Reality:
 
 def judged(goal: Goal, case: Case, names: CaseNames, steps: Sequence[Step]) -> PlayedCampaign:
     """A campaign judged against the truth."""
-    last, said = steps[-1], course.of(steps, Diagnosed)
-    if not isinstance(last, Ended):
+    last, said = steps[-1], course.of(steps, DiagnosedStep)
+    if not isinstance(last, EndedStep):
         raise InputError("The campaign did not end: compare campaigns in virtual time.")
     ends = {CERTAIN: [said[-1].causes[0].effects], INSEPARABLE: list(said[-1].same)} if said else {}
     named = ends.get(last.outcome, [])
@@ -122,7 +122,7 @@ def judged(goal: Goal, case: Case, names: CaseNames, steps: Sequence[Step]) -> P
         last.outcome,
         right,
         bool(named) and not right,
-        tuple(one.candidate for one in course.of(steps, Decided)),
+        tuple(one.candidate for one in course.of(steps, DecidedStep)),
         tuple(one.certainty for one in said),
     )
 

@@ -10,7 +10,15 @@ import pytest
 
 from simulation.campaign import choice, information
 from simulation.campaign.goal import GoalTable
-from simulation.campaign.steps import Begun, Cause, Decided, Diagnosed, Ended, Option, Step
+from simulation.campaign.steps import (
+    BegunStep,
+    DecidedStep,
+    DiagnosedStep,
+    EndedStep,
+    Option,
+    PossibleCause,
+    Step,
+)
 
 HEAD = GoalTable(tests=4)
 OPTIONS = (
@@ -21,47 +29,49 @@ OPTIONS = (
 )
 
 
-def diagnosed(**more: Any) -> Diagnosed:
+def diagnosed(**more: Any) -> DiagnosedStep:
     given: dict[str, Any] = {
         "test": 1,
         "file": "diagnosis-01.json",
         "version": "",
         "status": "ambiguous",
         "gap": 0.1,
-        "causes": (Cause(("a",), 0.6), Cause(("b",), 0.35)),
+        "causes": (PossibleCause(("a",), 0.6), PossibleCause(("b",), 0.35)),
         "same": (("a",),),
         "together": 0.6,
         "options": OPTIONS,
     }
-    return Diagnosed(**(given | more))
+    return DiagnosedStep(**(given | more))
 
 
-def following(*steps: Step, head: GoalTable = HEAD, pick: choice.Pick = choice.best) -> Decided | Ended:
+def following(
+    *steps: Step, head: GoalTable = HEAD, pick: choice.Pick = choice.best
+) -> DecidedStep | EndedStep:
     return choice.choosing(head, pick)(steps)
 
 
 def test_the_first_test_is_the_one_with_the_smallest_drift() -> None:
-    found = following(Begun("", "", tuple(reversed(OPTIONS))))
-    assert isinstance(found, Decided)
+    found = following(BegunStep("", "", tuple(reversed(OPTIONS))))
+    assert isinstance(found, DecidedStep)
     assert (found.test, found.candidate) == (1, 1)
 
 
 def test_among_equally_informative_tests_the_one_with_the_smallest_drift_is_chosen() -> None:
     found = following(diagnosed())
-    assert isinstance(found, Decided)
+    assert isinstance(found, DecidedStep)
     assert (found.test, found.candidate, found.bits) == (2, 2, 0.95)
     assert "0.95 bits" in found.why
 
 
 def test_tests_beyond_the_limits_and_played_tests_are_not_chosen() -> None:
-    found = following(Decided(1, 2, 0.0, ""), diagnosed())
-    assert isinstance(found, Decided)
+    found = following(DecidedStep(1, 2, 0.0, ""), diagnosed())
+    assert isinstance(found, DecidedStep)
     assert found.candidate == 3
 
 
 def test_the_same_seed_draws_the_same_random_tests() -> None:
     drawn = [following(diagnosed(), pick=partial(choice.at_random, seed)) for seed in (1, 1, 2, 3, 4)]
-    numbers = [one.candidate for one in drawn if isinstance(one, Decided)]
+    numbers = [one.candidate for one in drawn if isinstance(one, DecidedStep)]
     assert numbers[0] == numbers[1]
     assert set(numbers) <= {1, 2, 3}
     assert len(set(numbers)) > 1
@@ -70,8 +80,8 @@ def test_the_same_seed_draws_the_same_random_tests() -> None:
 @pytest.mark.parametrize(
     ("head", "more", "outcome", "words"),
     [
-        (HEAD, {"causes": (Cause(("a",), 0.96),)}, "certain", "The cause is certain: a, with 96 %."),
-        (HEAD, {"causes": (Cause((), 0.96),)}, "certain", "nothing beyond the tolerances"),
+        (HEAD, {"causes": (PossibleCause(("a",), 0.96),)}, "certain", "The cause is certain: a, with 96 %."),
+        (HEAD, {"causes": (PossibleCause((), 0.96),)}, "certain", "nothing beyond the tolerances"),
         (
             HEAD,
             {"same": (("a",), ("b",)), "together": 0.95},
@@ -88,18 +98,18 @@ def test_the_reason_for_the_end_of_a_campaign_is_named(
     head: GoalTable, more: dict[str, Any], outcome: str, words: str
 ) -> None:
     found = following(diagnosed(**more), head=head)
-    assert isinstance(found, Ended)
+    assert isinstance(found, EndedStep)
     assert found.outcome == outcome
     assert words in found.text
 
 
 def test_a_campaign_ends_when_every_test_of_its_list_is_played() -> None:
-    found = following(Decided(1, 1, 0.0, ""), diagnosed(options=OPTIONS[:1]))
-    assert found == Ended("limits", "Every test of the list is played.")
+    found = following(DecidedStep(1, 1, 0.0, ""), diagnosed(options=OPTIONS[:1]))
+    assert found == EndedStep("limits", "Every test of the list is played.")
 
 
 def test_if_no_test_is_within_the_limits_no_first_test_is_chosen() -> None:
-    assert isinstance(following(Begun("", "", OPTIONS[3:])), Ended)
+    assert isinstance(following(BegunStep("", "", OPTIONS[3:])), EndedStep)
 
 
 def test_a_test_that_separates_two_causes_with_certainty_gives_their_entropy() -> None:

@@ -19,7 +19,15 @@ from loop.signals import rows
 from recorder import files
 from simulation.campaign import actions, choice, course, goal, log, steps
 from simulation.campaign.goal import Goal
-from simulation.campaign.steps import Cause, Decided, Diagnosed, Endured, Option, PlayedStep, Step
+from simulation.campaign.steps import (
+    DecidedStep,
+    DiagnosedStep,
+    Endured,
+    Option,
+    PlayedStep,
+    PossibleCause,
+    Step,
+)
 
 
 class KilledError(BaseException):
@@ -47,15 +55,15 @@ class StandIn(actions.CampaignActions):
 
     killer: Killer
 
-    def diagnose(self, played: Sequence[PlayedStep], endured: Endured) -> Diagnosed:
+    def diagnose(self, played: Sequence[PlayedStep], endured: Endured) -> DiagnosedStep:
         self.killer()
         path = self._folder / f"diagnosis-{len(played):02d}.json"
         path.write_text(f"{[one.digest for one in played]} {endured.drift}")
         self.killer()
         sure = 0.4 + 0.2 * len(played)
         options = tuple(Option(one, 1e-3 * one, 0.0, "", 1.0 / one) for one in (1, 2, 3))
-        causes = (Cause(("a",), sure), Cause(("b",), 1.0 - sure))
-        return Diagnosed(len(played), path.name, "", "ambiguous", 0.1, causes, (("a",),), sure, options)
+        causes = (PossibleCause(("a",), sure), PossibleCause(("b",), 1.0 - sure))
+        return DiagnosedStep(len(played), path.name, "", "ambiguous", 0.1, causes, (("a",),), sure, options)
 
 
 @cache
@@ -190,14 +198,14 @@ def test_a_campaign_played_by_hand_waits_for_each_recording_and_continues_with_i
     found.killer = Killer()
     with log.opened(tmp_path) as kept:
         waiting = course.go_on(kept, found, choice.choosing(campaign().head))
-        assert isinstance(waiting, Decided)
+        assert isinstance(waiting, DecidedStep)
         plan = found.plan(waiting)
         assert (tmp_path / "test-01.toml").read_text() == plan.toml()
         own = tmp_path / "mine.mcap"
         own.write_bytes(recording(f"{plan.ground_motion.scale}:{plan.test.name}"))
         actions.take(own, waiting, tmp_path, plan)
         again = course.go_on(kept, found, choice.choosing(campaign().head))
-        assert isinstance(again, Decided)
+        assert isinstance(again, DecidedStep)
         assert again.test == 2
         with pytest.raises(
             InputError, match=r"is not of the test that is next: scale in \[ground_motion\] is 0.01"
@@ -208,7 +216,7 @@ def test_a_campaign_played_by_hand_waits_for_each_recording_and_continues_with_i
 def test_every_step_of_the_log_is_read_as_it_was_written() -> None:
     for one in uninterrupted()[0].splitlines():
         assert steps.line(steps.parsed(one)) == one + b"\n"
-    cut = steps.Interrupted(1, "test-01-interrupted-1.mcap", 0.001, 0.0)
+    cut = steps.InterruptedStep(1, "test-01-interrupted-1.mcap", 0.001, 0.0)
     assert steps.parsed(steps.line(cut)) == cut
 
 
@@ -230,6 +238,6 @@ def test_an_interrupted_test_in_real_time_is_kept_and_counts(tmp_path: Path) -> 
             course.go_on(kept, found, choice.choosing(own.head))
         assert len(list(tmp_path.glob("test-01-interrupted-*.mcap"))) == count - 1
     with log.opened(tmp_path) as kept:
-        cut = course.of(kept.steps, steps.Interrupted)
+        cut = course.of(kept.steps, steps.InterruptedStep)
         assert [one.file for one in cut] == ["test-01-interrupted-1.mcap"]
         assert course.endured(kept.steps).drift == cut[0].drift > 0.0
