@@ -56,7 +56,9 @@ def closed_loops(plan: Plan, ground: Array) -> None:
 
 def ticks(plan: Plan, ground: Array) -> None:
     """The kernels that the loops call at every tick."""
-    bound(substructure.enter, assembly.build(plan, ground), 0, 0.0, 0.0)
+    building = assembly.build(plan, ground)
+    bound(substructure.enter, building, 0, 0.0, 0.0)
+    bound(substructure.enter_building, building, 0, 0.0)
     balance = energy_balance.build(plan.test.interval, 0.5, 1.0, 1.0, np.ones(1), np.ones(2))
     bound(energy_balance.enter, balance, 0.0, 0.0, 0.0, 0.0)
     for kind in kinds.KINDS.values():
