@@ -7,6 +7,7 @@ in the file itself: the writer neither knows its readers nor waits for them.
 from __future__ import annotations
 
 import io
+import struct
 from collections.abc import Iterator
 from functools import partial
 from math import inf
@@ -37,6 +38,8 @@ from common.recording.run import Run
 LOOK_BYTES = 1 << 20  # of the file per look: some seconds of a test, decoded in a few tens of milliseconds
 # the records that are read; others are skipped
 WANTED = frozenset({Opcode.CHUNK, Opcode.METADATA, Opcode.ATTACHMENT})
+FOOTER_BYTES = 20  # of its body: two offsets and a checksum
+INDEX = struct.Struct("<HI")  # the beginning of a message index: its channel, and the bytes of its entries
 
 
 def read(path: Path, *, messages: bool = True) -> Run:
@@ -96,6 +99,7 @@ class Tail:
         self.damage = self.cause = ""
         self.misfit: InputError | None = None  # raised where messages do not fit their schema
         self._stream: io.BufferedReader | None = None
+        self._last = 0  # opcode of the newest whole record
         self._contents = Contents()
         self._bounds = Bounds(path, 0)
         self._metadata: dict[str, dict[str, str]] = {}
@@ -177,10 +181,27 @@ class Tail:
             if self.place >= limit:
                 self.behind = True
                 return
+            self._check_kind(source, opcode, after)
             if opcode in WANTED:
                 yield source.at(self.place, after - self.place)
-            self.place = after
+            self.place, self._last = after, opcode
             self.finished = opcode == Opcode.FOOTER
+
+    def _check_kind(self, source: GrowingFile, opcode: int, after: int) -> None:
+        """Raise ValueError where the next record cannot be of its kind: no checksum covers the byte that says it.
+
+        A chunk that is read as another kind would be skipped with its samples. The indices of its messages follow it.
+        """
+        body = after - self.place - HEAD.size
+        if opcode == Opcode.FOOTER and body != FOOTER_BYTES:
+            raise ValueError("a footer of another size")
+        if opcode != Opcode.MESSAGE_INDEX:
+            return
+        if self._last not in (Opcode.CHUNK, Opcode.MESSAGE_INDEX):
+            raise ValueError("an index of messages without a chunk")
+        _, entries = INDEX.unpack(source.at(self.place + HEAD.size, INDEX.size))
+        if body != INDEX.size + entries:
+            raise ValueError("an index of messages of another size")
 
 
 def unpacked(record: McapRecord, bounds: Bounds, *, messages: bool = True) -> Iterator[McapRecord]:

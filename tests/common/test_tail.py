@@ -54,6 +54,13 @@ def test_flushed_samples_are_read_at_the_next_look(tmp_path: Path) -> None:
     same(parts, read(path))
 
 
+class RecordedBytes(bytes):
+    """The bytes of a recording, which hypothesis prints; it refuses to print many."""
+
+    def __repr__(self) -> str:
+        return f"RecordedBytes({len(self)} bytes)"
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """A finished recording in many chunks."""
@@ -68,7 +75,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
             recording.add("event", seq, seq, example("event", seq))
             recording.flush()
     recording.close({"outcome": "completed"})
-    return path.read_bytes()
+    return RecordedBytes(path.read_bytes())
 
 
 def grown(path: Path, data: bytes, cuts: list[int], most: int) -> tuple[list[Run], Tail]:

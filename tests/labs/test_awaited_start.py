@@ -76,7 +76,9 @@ def test_nothing_moves_before_the_operators_start_and_the_readings_are_the_same(
             if name in one.columns[topic]:
                 assert (one.columns[topic][name] == other.columns[topic][name]).all()
     said = [event for event in other.events if event["code"] == "operator"]
-    assert [(event["lab"], event["text"]) for event in said] == [("master", "start: The test begins.")]
+    assert [(event["lab"], event["text"]) for event in said] == [
+        ("master", "start (ready): The test begins.")
+    ]
 
 
 def test_a_start_is_accepted_once_and_only_by_a_test_that_waits_for_it(brief: Plan, tmp_path: Path) -> None:
