@@ -15,7 +15,7 @@ from enum import Enum
 from typing import NamedTuple
 
 
-class Pace(Enum):
+class EarthquakePace(Enum):
     """How the earthquake's time passes."""
 
     __hash__ = object.__hash__
@@ -54,13 +54,13 @@ class EarthquakeTime:
         assert self.begun is not None  # noqa: S101 - the caller asks `pace` first
         self.resumed = max(tick, self.begun + self.ramp)
 
-    def pace(self, tick: int) -> Pace:
+    def pace(self, tick: int) -> EarthquakePace:
         """How the time passes in the interval after a tick."""
         if self.begun is None or self._over(tick):
-            return Pace.FULL
+            return EarthquakePace.FULL
         if tick < self.begun + self.ramp:
-            return Pace.SLOWING
-        return Pace.HELD if self.resumed is None or tick < self.resumed else Pace.RESUMING
+            return EarthquakePace.SLOWING
+        return EarthquakePace.HELD if self.resumed is None or tick < self.resumed else EarthquakePace.RESUMING
 
     def settle(self, tick: int) -> bool:
         """Forget a hold that is over at a tick; return whether the pace is full."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from common.earthquake_time import EarthquakeTime, Pace
+from common.earthquake_time import EarthquakePace, EarthquakeTime
 from common.lab.laboratory import REPEAT_NS, Laboratory
 from common.protocol.messages import Extend
 from common.recording.holds import HELD, HOLD, RESUME, RESUMED
@@ -26,7 +26,7 @@ NOT_RUNNING = "The test is not running."
 Decision = tuple[bool, str]  # whether an order is accepted, and a sentence
 
 
-class Motion(NamedTuple):
+class LaboratoryMotion(NamedTuple):
     """What the master knows of its own laboratory at the newest tick."""
 
     measured: tuple[float, ...]
@@ -43,10 +43,10 @@ class Holding:
         self.active = False  # whether there has been a hold
         self._lab, self._building, self._partners, self._limits = lab, building, partners, limits
         self._every = max(REPEAT_NS // lab.interval_ns, 1)  # ticks between repetitions
-        self._pace = Pace.FULL
+        self._pace = EarthquakePace.FULL
         self._forces: dict[str, float] = {}  # at standstill, N
 
-    def hold(self, tick: int, motion: Motion) -> Decision:
+    def hold(self, tick: int, motion: LaboratoryMotion) -> Decision:
         """Decide on a hold from a tick on, and begin it."""
         lab, time = self._lab, self._building.time
         if not lab.running or tick == 0:
@@ -60,7 +60,7 @@ class Holding:
         if judgement.obstacle:
             return False, f"The test cannot be held at present: {judgement.obstacle}."
         self._building.hold(tick)
-        self.active, self._pace = True, Pace.SLOWING
+        self.active, self._pace = True, EarthquakePace.SLOWING
         still = self._seconds(time, tick + time.ramp)
         share = judgement.taken / energies.given
         text = (
@@ -77,9 +77,9 @@ class Holding:
     def _refused(self, time: EarthquakeTime, tick: int) -> str:
         """Why the state of the test allows no hold, empty where it does."""
         plan, pace = self._lab.plan, time.pace(tick)
-        if pace is Pace.RESUMING:
+        if pace is EarthquakePace.RESUMING:
             return f"The test is resuming: order the hold again in {self._length(time):.2g} s."
-        if pace is not Pace.FULL:
+        if pace is not EarthquakePace.FULL:
             return "The test is held already."
         left = plan.ticks - (tick - time.added(tick)) - time.ramp
         if left * plan.test.interval < LEAST_LEFT:
@@ -87,7 +87,7 @@ class Holding:
             return f"The test is nearly over: a hold needs {needed:.2g} s of the earthquake after it."
         return ""
 
-    def _moving(self, motion: Motion, duration: float) -> dict[str, Moving]:
+    def _moving(self, motion: LaboratoryMotion, duration: float) -> dict[str, Moving]:
         """The motion of every laboratory, by role."""
         interval = self._lab.plan.test.interval
         _, effort, velocity, *_ = self._building.told
@@ -97,12 +97,12 @@ class Holding:
         own = Moving(velocity, effort, motion.measured, rates, duration)
         return {MASTER: own} | {one.role: one.moving(duration, interval) for one in self._partners.all}
 
-    def resume(self, tick: int, motion: Motion) -> Decision:
+    def resume(self, tick: int, motion: LaboratoryMotion) -> Decision:
         """Decide on the resumption of a held test from a tick on, and begin it."""
         lab, time = self._lab, self._building.time
         if not lab.running:
             return False, NOT_RUNNING
-        if time is None or time.pace(tick) is Pace.FULL:
+        if time is None or time.pace(tick) is EarthquakePace.FULL:
             return False, "The test is not held."
         if time.resumed is not None:
             return False, "The test is resuming already."
@@ -111,7 +111,7 @@ class Holding:
         at = self._seconds(time, tick + time.ramp)
         return True, f"The earthquake's time speeds up over {self._length(time):.3g} s from {at:.3f} s on."
 
-    def follow(self, tick: int, motion: Motion) -> None:
+    def follow(self, tick: int, motion: LaboratoryMotion) -> None:
         """Take note of a tick that has been computed: say what has changed, and how long the test will be."""
         time = self._building.time
         if time is None:
@@ -126,34 +126,36 @@ class Holding:
         if tick % self._every == 0:
             self._say()
 
-    def _changed(self, time: EarthquakeTime, pace: Pace, tick: int, motion: Motion) -> None:
+    def _changed(
+        self, time: EarthquakeTime, pace: EarthquakePace, tick: int, motion: LaboratoryMotion
+    ) -> None:
         """Record that the earthquake's time passes in another way from a tick on."""
         lab = self._lab
-        tick = time.resumed if pace is Pace.RESUMING and time.resumed is not None else tick
+        tick = time.resumed if pace is EarthquakePace.RESUMING and time.resumed is not None else tick
         at = self._seconds(time, tick)
         values = {"earthquake_time": at}
-        if pace is Pace.RESUMING:
-            if self._pace is Pace.SLOWING:  # there was no tick between the two ramps
+        if pace is EarthquakePace.RESUMING:
+            if self._pace is EarthquakePace.SLOWING:  # there was no tick between the two ramps
                 self._stood(time, tick, motion)
             changes = {name: new - self._forces.get(name, new) for name, new in self._felt(motion).items()}
             said = ", ".join(f"{name} by {change:+.3g} N" for name, change in changes.items())
             text = f"The earthquake's time goes on from {at:.3f} s; measured during the hold, forces changed: {said}."
             lab.note(RESUME, text, tick=tick, values=values | changes)
-        elif pace is Pace.HELD:
+        elif pace is EarthquakePace.HELD:
             self._stood(time, tick, motion)
-        elif pace is Pace.FULL:
+        elif pace is EarthquakePace.FULL:
             behind = time.added(tick) * lab.plan.test.interval
             text = f"The earthquake's time passes in real time again, {behind:.3f} s behind the test's time."
             lab.note(RESUMED, text, tick=tick, values=values | {"behind": behind})
 
-    def _stood(self, time: EarthquakeTime, tick: int, motion: Motion) -> None:
+    def _stood(self, time: EarthquakeTime, tick: int, motion: LaboratoryMotion) -> None:
         """Record that the earthquake's time stands still."""
         at = self._seconds(time, tick)
         self._forces = self._felt(motion)
         text = f"Held: the earthquake's time stands still at {at:.3f} s, and so do all transfer systems."
         self._lab.note(HELD, text, tick=tick, values={"earthquake_time": at})
 
-    def _felt(self, motion: Motion) -> dict[str, float]:
+    def _felt(self, motion: LaboratoryMotion) -> dict[str, float]:
         """The measured force (N) of every laboratory by its channel, with the slave's role where there are several."""
         several = len(self._partners.all) > 1
         return dict(motion.force) | {

@@ -41,7 +41,7 @@ from laboratories import kinds
 from laboratories.longest import resting
 from master.building import BuildingStep, Outputs
 from master.handshake import START_S, MasterHandshake
-from master.holding import Holding, Motion
+from master.holding import Holding, LaboratoryMotion
 from master.limits import MasterLimits
 from master.own import OwnLaboratory
 from master.partner import Partner
@@ -288,9 +288,9 @@ class MasterLoop(RigLoop):
     # -- hold ---------------------------------------------------------------------------------------
 
     @property
-    def _motion(self) -> Motion:
+    def _motion(self) -> LaboratoryMotion:
         """The newest measurements of the master's own laboratory."""
-        return Motion(self._measured, self._before, self._own.force(self._measured))
+        return LaboratoryMotion(self._measured, self._before, self._own.force(self._measured))
 
     def hold(self) -> tuple[bool, str]:
         """Bring the earthquake's time to a standstill; return whether that is possible now, and a sentence."""

@@ -18,7 +18,7 @@ START, STOP, EMERGENCY, RESET = "start", "stop", "emergency", "reset"
 HOLD, RESUME = "hold", "resume"
 
 
-class Order(NamedTuple):
+class OperatorOrder(NamedTuple):
     """A request that an operator may make of a test."""
 
     word: str  # in messages and in the recording
@@ -30,15 +30,15 @@ class Order(NamedTuple):
         return (MASTER, *slaves) if self.everywhere else (MASTER,)
 
 
-ORDERS: Mapping[str, Order] = {
+ORDERS: Mapping[str, OperatorOrder] = {
     order.word: order
     for order in (
-        Order(START, "begin a test whose armed laboratories wait for it", everywhere=False),
-        Order(STOP, "bring all rigs to rest in order and end the test"),
-        Order(EMERGENCY, "stop all rigs at once, without a ramp; latched until reset"),
-        Order(RESET, "let laboratories leave their latched safe state once its cause is gone"),
-        Order(HOLD, "let the earthquake's time slow down and stand still", everywhere=False),
-        Order(RESUME, "let the earthquake's time of a held test go on", everywhere=False),
+        OperatorOrder(START, "begin a test whose armed laboratories wait for it", everywhere=False),
+        OperatorOrder(STOP, "bring all rigs to rest in order and end the test"),
+        OperatorOrder(EMERGENCY, "stop all rigs at once, without a ramp; latched until reset"),
+        OperatorOrder(RESET, "let laboratories leave their latched safe state once its cause is gone"),
+        OperatorOrder(HOLD, "let the earthquake's time slow down and stand still", everywhere=False),
+        OperatorOrder(RESUME, "let the earthquake's time of a held test go on", everywhere=False),
     )
 }
 
