@@ -201,15 +201,18 @@ class MasterHandshake:
 
     # -- an operator's start ------------------------------------------------------------------------
 
-    def start(self) -> bool:
-        """Begin the test that waits for an operator; whether it did."""
-        waited = self._waits_ns > 0 and self._lab.exchange.state is State.ARMED
-        if waited:
-            self._awaits, self._waits_ns = False, 0
-            self._lab.heard_ns = self._lab.clock.now()
-            self._schedule(self._lab.heard_ns)
-            self._ask_anew(self._lab.heard_ns)
-        return waited
+    def start(self) -> tuple[bool, str]:
+        """Begin a test that waits for the operator's start; return whether it did, and a sentence."""
+        lab = self._lab
+        if lab.running:
+            return False, "The test runs already."
+        if self._waits_ns == 0 or lab.exchange.state is not State.ARMED:
+            return False, f"The test does not wait for a start: the laboratory is {lab.safety.mode.value}."
+        self._awaits, self._waits_ns = False, 0
+        lab.heard_ns = lab.clock.now()
+        self._schedule(lab.heard_ns)
+        self._ask_anew(lab.heard_ns)
+        return True, "The test begins."
 
     @property
     def given_up(self) -> bool:

@@ -137,15 +137,8 @@ class MasterLoop(RigLoop):
             self.end(f"No operator started the armed test within {START_S:g} s.")
 
     def start(self) -> tuple[bool, str]:
-        """Begin a test that waits for the operator's start; whether it did, and a sentence."""
-        if self.lab.running:
-            return False, "The test runs already."
-        if not self._handshake.start():
-            return (
-                False,
-                f"The test does not wait for a start: the laboratory is {self.lab.safety.mode.value}.",
-            )
-        return True, "The test begins."
+        """Begin a test that waits for the operator's start; return whether it did, and a sentence."""
+        return self._handshake.start()
 
     # -- ticks ------------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from common.lab.operation import EMERGENCY, HOLD, RESET, RESUME, START, STOP
+from common.lab.operation import EMERGENCY, HOLD, ORDERS, RESET, RESUME, START, STOP
 
 CHECK, MACHINE, ARM = "check", "machine", "arm"  # which this machine carries out, not the laboratories
 
@@ -21,24 +21,29 @@ class Word(NamedTuple):
     planned: bool = False  # whether it is for the plan that the page showed
 
 
+def ordered(word: str, label: str, *, moves: bool = False, planned: bool = False) -> Word:
+    """A button for an order that the laboratories of a running test carry out."""
+    return Word(word, label, ORDERS[word].says, moves=moves, planned=planned)
+
+
 WORDS: Mapping[str, Word] = {
     one.word: one
     for one in (
-        Word(CHECK, "Check the plan", "describes the plan and what it lacks", of_test=False),
-        Word(MACHINE, "Check the machine", "measures what this machine lacks", of_test=False),
+        Word(CHECK, "Check the plan", "describe the plan and what it lacks", of_test=False),
+        Word(MACHINE, "Check the machine", "measure what this machine lacks", of_test=False),
         Word(
             ARM,
             "Arm",
-            "makes the rigs ready; nothing moves before Start",
+            "make the rigs ready; nothing moves before Start",
             moves=True,
             of_test=False,
             planned=True,
         ),
-        Word(START, "Start", "begins the armed test", moves=True, planned=True),
-        Word(HOLD, "Hold", "lets the earthquake's time slow down and stand still"),
-        Word(RESUME, "Resume", "lets the earthquake's time of a held test go on", moves=True),
-        Word(STOP, "Stop", "brings all rigs to rest in order and ends the test"),
-        Word(EMERGENCY, "Emergency stop", "disarms all rigs at once, without a ramp"),
-        Word(RESET, "Reset", "lets latched laboratories go once the cause is gone", moves=True),
+        ordered(START, "Start", moves=True, planned=True),
+        ordered(HOLD, "Hold"),
+        ordered(RESUME, "Resume", moves=True),
+        ordered(STOP, "Stop"),
+        ordered(EMERGENCY, "Emergency stop"),
+        ordered(RESET, "Reset", moves=True),
     )
 }

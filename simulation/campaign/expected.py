@@ -35,6 +35,8 @@ from simulation.campaign import information
 from simulation.campaign.hypotheses import HiddenCauses, PartCauses, sight
 from simulation.campaign.information import Expected
 
+SCARCE = 1e-5  # probability of a hidden cause below which no test is judged by it
+
 kept_motion = lru_cache(maxsize=64)(load)
 """The record of a motion; the same few are scaled again and again."""
 
@@ -160,9 +162,6 @@ def shown(causes: HiddenCauses, parts_: Sequence[Part | None]) -> Expected:
     apart = np.maximum(seen[:, None], seen[None, :])
     np.fill_diagonal(apart, 0.0)
     return information.expected(causes.weights, apart)
-
-
-SCARCE = 1e-5  # probability of a hidden cause below which no test is judged by it
 
 
 class BarePrediction(NamedTuple):
