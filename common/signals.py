@@ -88,6 +88,21 @@ class Channels:
         """
         return (*(signal.name for signal in self.driving), *self.rates)
 
+    @property
+    def used(self) -> str:
+        """The name of the master's signal with a slave's force as a tick used it."""
+        return f"{self.force}_used"
+
+    @property
+    def used_seq(self) -> str:
+        """The name of the master's signal with the tick at which the slave measured the force that was used."""
+        return f"{self.force}_seq"
+
+    @property
+    def used_age(self) -> str:
+        """The name of the master's signal with the age of the force that was used."""
+        return f"{self.force}_age"
+
 
 COLUMN_CHANNELS = Channels(
     target=Signal("column_target", "m", "specimen deformation wanted"),
@@ -276,7 +291,7 @@ def _master(
     for channels, roles in slaves.items():
         sent = [row._replace(text=f"{row.text}, as sent") for row in (*_at_end(channels), *_rates(channels))]
         named = [row._replace(name=SENT_ + row.name) if row.name in taken else row for row in sent]
-        rows += [row._replace(slaves=roles) for row in (*_used(channels.force), *named)]
+        rows += [row._replace(slaves=roles) for row in (*_used(channels), *named)]
     return tuple(rows)
 
 
@@ -291,14 +306,16 @@ def _at_end(channels: Channels) -> tuple[Signal, ...]:
     return (target._replace(text=f"{target.text} at the end of the interval"), *effort)
 
 
-def _used(force: str) -> tuple[Signal, ...]:
+def _used(channels: Channels) -> tuple[Signal, ...]:
     """The signals of a slave's force as a tick uses it."""
-    words = force.replace("_", " ")
+    words = channels.force.replace("_", " ")
     device = words.removesuffix(" force") if words.endswith(" force") else "laboratory"
     return (
-        Signal(f"{force}_used", "N", f"{words} used, at the {device}'s own scale"),
-        Signal(f"{force}_seq", "", "tick at which that force was measured, -1 for none yet", FieldType.INDEX),
-        Signal(f"{force}_age", "s", "its age at use"),
+        Signal(channels.used, "N", f"{words} used, at the {device}'s own scale"),
+        Signal(
+            channels.used_seq, "", "tick at which that force was measured, -1 for none yet", FieldType.INDEX
+        ),
+        Signal(channels.used_age, "s", "its age at use"),
     )
 
 

@@ -227,7 +227,7 @@ def used(record: Record) -> list[str]:
     """The signals that the building was computed from, the ground motion aside."""
     own, other = record.own, record.other
     names = [own.kind.channels.force, own.kind.channels.position] if own else []
-    return names + ([f"{other.kind.channels.force}_used"] if other else [])
+    return names + ([other.kind.channels.used] if other else [])
 
 
 def driven(record: Record, lab: RecordedLaboratory) -> bool:

@@ -262,7 +262,7 @@ class Building:
         if record.whole is not None:
             used = record.whole.used
         elif other is not None:
-            used = record.signals[f"{other.kind.channels.force}_used"][:, None]
+            used = record.signals[other.kind.channels.used][:, None]
         else:
             used = np.zeros((record.ticks, 0))
         names = (own.kind.channels.position, own.kind.channels.force) if own else ()

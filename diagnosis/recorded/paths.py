@@ -34,8 +34,8 @@ def paths(record: Record, nominal: dict[str, Array] | None) -> Paths:
         if own.kind.name == COLUMN:
             force = path(record, nominal, channels.position, channels.force)
     if other is not None:
-        measured = other.kind.channels.force
-        exchange = path(record, nominal, other.signal(measured), f"{measured}_used", damped=False)
+        measured = other.kind.channels
+        exchange = path(record, nominal, other.signal(measured.force), measured.used, damped=False)
     return Paths(command=command, force=force, exchange=exchange)
 
 

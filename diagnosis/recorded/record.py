@@ -16,14 +16,13 @@ from common.recording.imported import ImportedData, imported
 from common.recording.run import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING
-from common.signals import shared
+from common.signals import alike
 from diagnosis.recorded.laboratory import RecordedLaboratory, recorded
 from diagnosis.signals.mask import Mask
 from laboratories import effects
 from laboratories.effects.effect import Effect
 from laboratories.effects.sites import BUILDING, LINK, sensors
-from laboratories.kinds import KINDS
-from laboratories.kinds import topics as topics_of
+from laboratories.kinds import KINDS, kind_of
 from loop import substructure
 from models.registry import Array
 from models.system import System
@@ -182,8 +181,8 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
 def used_forces(run: Run, plan: Plan, ticks: int) -> Array:
     """Forces of all slaves that the master used, (ticks, slaves) N; zero where they were not recorded."""
     result = np.zeros((ticks, len(plan.roles)))
-    for name, roles in shared(topics_of(plan)[MASTER]).items():
-        values = run.columns[MASTER].get(name) if name.endswith("_used") else None
+    for channels, roles in alike({role: kind_of(plan, role).channels for role in plan.roles}).items():
+        values = run.columns[MASTER].get(channels.used)
         if values is not None:
             rows, _ = laid_out(values.reshape(values.shape[0], -1), run.sequences[MASTER], ticks)
             result[:, [plan.roles.index(role) for role in roles]] = rows

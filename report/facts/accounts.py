@@ -50,12 +50,12 @@ def accounts(run: Run) -> dict[str, dict[str, int]]:
         if event["code"] == "exchange":
             told.setdefault(event["lab"], {}).update(event["values"])
     found = {}
-    force = {lab.role: lab.channels.force for lab in laboratories(run)}
+    answered = {lab.role: lab.channels.used_seq for lab in laboratories(run)}
     for role in run.roles:
         master, slave = told.get(MASTER, {}), told.get(role, {})
         part = run.of(role)
         commands = beyond(part, SLAVE, "command_seq", MASTER)
-        feedbacks = beyond(part, MASTER, f"{force.get(role, '')}_seq", SLAVE)
+        feedbacks = beyond(part, MASTER, answered.get(role, ""), SLAVE)
         ends = {
             "commands": (master.get(f"{role}.commands_sent"), slave, "commands", commands),
             "feedbacks": (slave.get("feedbacks_sent"), master, f"{role}.feedbacks", feedbacks),

@@ -63,7 +63,7 @@ def follows_drift(lab: LaboratoryFacts) -> bool:
 def resisting(run: Run, lab: LaboratoryFacts) -> tuple[int, Values] | None:
     """The storey of a laboratory and the force (n,) N with which it resists there; None where it is not recorded."""
     columns, coupling = run.columns[MASTER], lab.coupling
-    force = lab.channels.force if lab.topic == MASTER else f"{lab.channels.force}_used"
+    force = lab.channels.force if lab.topic == MASTER else lab.channels.used
     if coupling is None or force not in columns:
         return None
     values = columns[force]

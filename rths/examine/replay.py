@@ -190,7 +190,7 @@ def forces_used(plan: Plan, columns: dict[str, Any]) -> list[Any]:
 
     found: dict[int, Any] = {}
     for group in slaves_alike(plan):
-        values = columns[f"{kind_of(plan, group[0][1]).channels.force}_used"]
+        values = columns[kind_of(plan, group[0][1]).channels.used]
         several = [values] if len(group) == 1 else list(zip(*values, strict=True))
         found |= {place: one for (place, _), one in zip(group, several, strict=False)}
     return [found.get(place, ()) for place in range(len(plan.roles))]
@@ -231,7 +231,7 @@ def replay_slaves(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, 
     for role in recording.roles:
         if recording.has(role):
             tell(f"the {title(role)}'s ticks", 0, 0)
-            used, suffix = f"{kind_of(plan, role).channels.force}_used", role.removeprefix(SLAVE)
+            used, suffix = kind_of(plan, role).channels.used, role.removeprefix(SLAVE)
             for name, match in replay_exchange(recording, plan, role).items():
                 matches[f"{MASTER}/{name}{suffix}" if name == used else f"{role}/{name}"] = match
     return matches
@@ -248,7 +248,7 @@ def replay_exchange(whole: Run, plan: Plan, role: str) -> dict[str, Match]:
     sent = {seq: place for place, seq in enumerate(master["seq"])}
     read = {seq: place for place, seq in enumerate(slave["seq"])}
     pairs = list(zip(sent_names(plan)[role], channels.sent, strict=True))
-    force, used = channels.force, f"{channels.force}_used"
+    force, used = channels.force, channels.used
     matches = {name: Match() for name in (*channels.sent, channels.command.name, used)}
     ramp = whole.ramps.get(role, {}).get("seq", ())
     replay_command(plan, role, slave, matches[channels.command.name], set(map(int, ramp)))
@@ -257,7 +257,7 @@ def replay_exchange(whole: Run, plan: Plan, role: str) -> dict[str, Match]:
             for there, here in pairs:
                 matches[here].take(t, master[there][source], slave[here][place])
     for place, t in enumerate(master["t"]):
-        if (source := read.get(master[f"{force}_seq"][place])) is not None:
+        if (source := read.get(master[channels.used_seq][place])) is not None:
             matches[used].take(t, slave[force][source], master[used][place])
     return matches
 

@@ -104,7 +104,7 @@ def play_building(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Val
     if MASTER in kinds:
         own = kinds[MASTER].channels
         felt = [columns[own.position], columns[own.force]]
-    used = [share_of(run, role, f"{kinds[role].channels.force}_used") for role in plan.roles]
+    used = [share_of(run, role, kinds[role].channels.used) for role in plan.roles]
     forces = np.stack(used, axis=1) if used else np.zeros((ticks, 0))
     inputs = zip(*(values.tolist() for values in (*felt, forces)), strict=True)
     outputs = [step(tick, *values) for tick, values in enumerate(inputs)]
@@ -129,7 +129,7 @@ def messages(case: Case, run: Run, role: str) -> Differences:
     on_time = np.concatenate([[0.0], slave[channels.force][: ticks - 1]]) if ticks else np.zeros(0)
     target = sent_names(plan)[role][0]
     return [
-        (share_of(run, role, f"{channels.force}_used")[:ticks] - on_time, noise[channels.force]),
+        (share_of(run, role, channels.used)[:ticks] - on_time, noise[channels.force]),
         (
             slave[channels.target.name][:ticks] - share_of(run, role, target)[:ticks],
             noise[channels.position],

@@ -17,6 +17,7 @@ from common.recording.reader import read
 from common.recording.run import GROUND, Run, Values
 from common.recording.writer import SIGNALS, Recording
 from common.roles import MASTER
+from common.signals import Channels
 from laboratories import kinds
 from validation.blind import lots
 from validation.blind.logger.logged import logged
@@ -51,20 +52,20 @@ def relogged(run: Run, plan: Plan, logger: Logger, levels: Mapping[str, float], 
                 logger, row, true, levels[row.name], plan.test.interval, generator
             )
         if role != MASTER:
-            use(run, columns, role, kind.channels.force)
+            use(run, columns, role, kind.channels)
     return columns
 
 
-def use(run: Run, columns: Columns, role: str, force: str) -> None:
+def use(run: Run, columns: Columns, role: str, channels: Channels) -> None:
     """Replace the force that the master used by the logged force of the slave, by the number of the message."""
-    used, numbers = f"{force}_used", f"{force}_seq"
+    force, used = channels.force, channels.used
     if used not in columns.get(MASTER, {}):
         return
     roles = run.shared.get(used, (role,))
     place = roles.index(role)
     shape = columns[MASTER][used].shape
     replaced = np.array(columns[MASTER][used], dtype=np.float64).reshape(shape[0], -1)
-    seq = columns[MASTER][numbers].reshape(shape[0], -1)[:, place].astype(np.int64)
+    seq = columns[MASTER][channels.used_seq].reshape(shape[0], -1)[:, place].astype(np.int64)
     there = (seq >= 0) & (seq < columns[role][force].size)
     replaced[there, place] = columns[role][force][seq[there]]
     columns[MASTER][used] = replaced.reshape(shape)
