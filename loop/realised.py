@@ -57,7 +57,7 @@ def check(name: str, only: str, whole: Plan, known: dict[str, Effect]) -> None:
                 f"The effect '{name}' acts on the {CATALOGUE[name].site}, which the plan's test does not have: leave "
                 "it out, or change kind in [master] or [slave]."
             )
-        raise InputError(f"Unknown effect '{name}': {nearest(name, known)}")
+        raise InputError(f"Unknown effect '{name}' in [[effect]]: {nearest(name, known)}")
     site = known[name].site
     if only and not (site == sites.LINK and only != MASTER) and only not in sites.holders(whole, site):
         named = "one slave: leave out its slave" if only != MASTER else "the master: leave out its laboratory"

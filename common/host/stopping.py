@@ -33,8 +33,7 @@ class Stopper:
         self.answer = answer
         self.presses = 0
         self._reason = ""
-        for number in taken():
-            signal.signal(number, self._caught)
+        self._before = {number: signal.signal(number, self._caught) for number in taken()}
 
     def _caught(self, number: int, _frame: FrameType | None) -> None:
         self.presses += 1
@@ -46,6 +45,11 @@ class Stopper:
     def __call__(self) -> str:
         """The reason, empty while there is none."""
         return self._reason
+
+    def release(self) -> None:
+        """Treat the signals as before, where a command goes on after a test."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
     @staticmethod
     def ignore() -> None:

@@ -35,8 +35,8 @@ def page(goal: Goal, steps: Sequence[Step]) -> str:
         causes=tables.causes(steps),
         choices=list(
             zip(
-                [one for one in tables.tests(steps) if one.decided.test > 1],
-                [tables.choices(goal, one) for one in tables.tests(steps) if one.decided.test > 1],
+                tables.tests(steps),
+                [tables.choices(goal, one) for one in tables.tests(steps)],
                 pictures.choices(steps),
                 strict=True,
             )

@@ -44,8 +44,8 @@ def probabilities(steps: Sequence[Step]) -> DrawnPicture:
 
 
 def choices(steps: Sequence[Step]) -> list[DrawnPicture]:
-    """For each choice but the first, the candidates by drift and expected information."""
-    return [choice(one) for one in tests(steps) if one.decided.test > 1]
+    """For each choice the candidates by drift and expected information."""
+    return [choice(one) for one in tests(steps)]
 
 
 def choice(one: TestOfCampaign) -> DrawnPicture:

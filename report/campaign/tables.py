@@ -19,6 +19,7 @@ from simulation.campaign.steps import (
     Option,
     PlayedStep,
     PossibleCause,
+    RecordedStep,
     Step,
 )
 
@@ -74,7 +75,7 @@ def ending(goal: Goal, steps: Sequence[Step]) -> str:
     )
 
 
-def strained(one: PlayedStep | InterruptedStep) -> str:
+def strained(one: RecordedStep) -> str:
     """What a test did to the specimens."""
     return f"drift {quantity(one.drift, 'm')}, {quantity(one.energy, 'J')} absorbed"
 
@@ -94,7 +95,7 @@ def overview(goal: Goal, steps: Sequence[Step]) -> TitledTable:
             [
                 str(one.decided.test),
                 goal.candidate(one.decided.candidate).text,
-                f"{one.decided.bits:.2f}" if one.decided.test > 1 else "–",
+                f"{one.decided.bits:.2f}",
                 quantity(one.played.drift, "m") if one.played else "–",
                 quantity(one.played.energy, "J") if one.played else "–",
                 one.diagnosed.status.replace("_", " ") if one.diagnosed else "–",
@@ -123,8 +124,8 @@ def choices(goal: Goal, one: TestOfCampaign) -> TitledTable:
     rows = [
         [
             goal.candidate(each.candidate).text,
-            f"{each.bits:.2f}" if one.decided.test > 1 else "–",
-            percent(each.certainty) if one.decided.test > 1 else "–",
+            f"{each.bits:.2f}",
+            percent(each.certainty),
             quantity(each.drift, "m"),
             quantity(each.energy, "J"),
             "chosen" if each.candidate == one.decided.candidate else each.refused or "",

@@ -148,7 +148,7 @@ def gone_on(args: argparse.Namespace, goal: Goal, play: Play, folder: Path, prog
         work = actions.CampaignActions(goal, folder, play, keep, progress.tell)
         if args.played:
             given(args.played, kept.steps, work, folder)
-        course.go_on(kept, work, choice.choosing(goal.head))
+        course.go_on(kept, work, choice.choosing(goal.head, gentle=goal.gentle))
         return kept.steps
 
 
@@ -200,8 +200,14 @@ def in_real_time(args: argparse.Namespace, reality: Path | None) -> Play:
         words += [word for risk in args.accept_risk for word in ("--accept-risk", risk)]
         told = parser_for("run").parse_args(words)
         truth, gate = cli.load_reality(reality, plan), Gate(cli.accepted_risks(told))
-        with reserved(path, plan, force=True) as output:
-            error = runs.in_real_time(told, plan, truth, output, Stopper(), gate)
+        stopping = Stopper()
+        try:
+            with reserved(path, plan, force=True) as output:
+                error = runs.in_real_time(told, plan, truth, output, stopping, gate)
+        finally:
+            stopping.release()
+        if stopping():  # the user ends the campaign, an interlock only the test
+            raise error or InterlockError(stopping())
         if error is not None and not isinstance(error, InterlockError):
             raise error
         return True

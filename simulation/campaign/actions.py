@@ -90,7 +90,7 @@ class CampaignActions:
         run = read(path)
         refuse_other(plan, run)
         ended = outcome(run.metadata.get("summary", {}))
-        return PlayedStep(decided.test, path.name, digest_of(path), ended, *strain.of_run(plan, run))
+        return PlayedStep(decided.test, path.name, *strain.of_run(plan, run), digest_of(path), ended)
 
     def diagnose(self, played: Sequence[PlayedStep], endured: Endured) -> DiagnosedStep:
         """Diagnose all tests together, the one with the largest drift first, whose gap stands out most."""

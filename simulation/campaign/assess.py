@@ -19,6 +19,7 @@ from models.registry import Array
 from models.system import System
 from simulation.campaign import expected, hypotheses, information, strain
 from simulation.campaign.goal import CampaignTest, Goal, plan_of
+from simulation.campaign.hypotheses import HiddenCauses
 from simulation.campaign.information import Expected
 from simulation.campaign.steps import Endured, Option, PossibleCause
 
@@ -39,13 +40,13 @@ class Assessment(NamedTuple):
 
 
 def nominal(goal: Goal) -> tuple[Option, ...]:
-    """The candidates before the first test, as the plan's nominal models predict them."""
-    return tuple(
-        judged(
-            goal, one.number, plan, [expected.rolled_out(plan, expected.laboratories({}, plan))], Endured()
-        )
-        for one, plan in tests(goal, 1)
-    )
+    """The candidates before the first test: what they would show of each effect that the laboratories may have.
+
+    The laboratories are as planned, and their sensors' noise is that of the first candidate's simulation.
+    """
+    plan = plan_of(goal, 1, 1)
+    known = HiddenState({}, hypotheses.hiding(expected.rehearsed(plan), played=False))
+    return tuple(looked_at(goal, known, 1, Endured())[0])
 
 
 def tests(goal: Goal, test: int) -> Iterator[tuple[CampaignTest, Plan]]:
@@ -56,22 +57,33 @@ def tests(goal: Goal, test: int) -> Iterator[tuple[CampaignTest, Plan]]:
 
 def knowledge(found: Found) -> NamedState | HiddenState:
     """What the diagnosis of all tests so far says of the cause."""
-    return NamedState(found) if hypotheses.open_parts(found) or in_samples(found) else HiddenState(found)
+    named = any(fit.names for part in hypotheses.open_parts(found) for fit in part.fits)
+    if named or in_samples(found):
+        return NamedState(found)
+    return HiddenState(found, hypotheses.hidden(found))
 
 
 def assessed(goal: Goal, known: NamedState | HiddenState, test: int, endured: Endured) -> Assessment:
     """What each candidate would add to what is known, as the test of this number."""
+    options, apart = looked_at(goal, known, test, endured)
+    same, together = known.inseparable(apart)
+    return Assessment(same, together, tuple(options))
+
+
+def looked_at(
+    goal: Goal, known: NamedState | HiddenState, test: int, endured: Endured
+) -> tuple[list[Option], list[list[Array]]]:
+    """Every candidate, and how far each of those within the limits moves the causes of the parts apart."""
     options, apart = [], []
     for one, plan in tests(goal, test):
         rollouts = [expected.rolled_out(plan, systems) for systems in known.plausible(plan)]
         option = judged(goal, one.number, plan, rollouts, endured)
         if rollouts[0].finite:
-            expected, distances = known.told(plan, rollouts[0])
-            option = replace(option, bits=expected.bits, certainty=expected.certainty)
+            tells, distances = known.told(plan, rollouts[0])
+            option = replace(option, bits=tells.bits, certainty=tells.certainty)
             apart += [distances] if not option.refused else []
         options.append(option)
-    same, together = known.inseparable(apart)
-    return Assessment(same, together, tuple(options))
+    return options, apart
 
 
 def in_samples(found: Found) -> tuple[str, ...]:
@@ -175,9 +187,9 @@ class NamedState:
 class HiddenState:
     """The state in which no part has a gap: something may still be there that the tests could not show."""
 
-    def __init__(self, found: Found) -> None:
+    def __init__(self, found: Found, hidden: HiddenCauses) -> None:
         self.found = found
-        self.hidden = hypotheses.hidden(found)
+        self.hidden = hidden
 
     def plausible(self, plan: Plan) -> Iterator[Mapping[str, System]]:
         """The laboratories as found; each hidden cause by itself is too improbable to be reckoned with."""
@@ -185,7 +197,7 @@ class HiddenState:
 
     def told(self, plan: Plan, rollout: Rollout) -> tuple[Expected, list[Array]]:
         """What a test tells of the hidden causes."""
-        seen = {role: expected.parts(plan, rollout, role) for role in self.found}
+        seen = {role: expected.parts(plan, rollout, role) for role in dict.fromkeys(self.hidden.roles)}
         there = [
             seen[role].get(fit.data.part.name)
             for role, fit in zip(self.hidden.roles, self.hidden.fits, strict=True)
@@ -194,12 +206,13 @@ class HiddenState:
 
     def inseparable(self, _apart: Sequence[Sequence[Array]]) -> tuple[tuple[tuple[str, ...], ...], float]:
         """That nothing is there."""
-        return ((),), self.hidden.nothing
+        return ((),), self.hidden.sure * float(self.hidden.weights[0])
 
     def causes(self) -> tuple[PossibleCause, ...]:
         """Nothing, and the hidden causes by their effects."""
-        chances: dict[str, float] = {}
-        for cause, weight in zip(self.hidden.causes, self.hidden.weights[1:], strict=True):
-            chances[cause.name] = chances.get(cause.name, 0.0) + float(weight)
-        rows = [PossibleCause((name,), chance) for name, chance in chances.items()]
-        return (PossibleCause((), self.hidden.nothing), *sorted(rows, key=lambda one: -one.probability))
+        chances: dict[tuple[str, ...], float] = {}
+        names = [(), *((cause.name,) for cause in self.hidden.causes)]
+        for effects, weight in zip(names, self.hidden.weights, strict=True):
+            chances[effects] = chances.get(effects, 0.0) + self.hidden.sure * float(weight)
+        rows = [PossibleCause(effects, chance) for effects, chance in chances.items()]
+        return (rows[0], *sorted(rows[1:], key=lambda one: -one.probability))

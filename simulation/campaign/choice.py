@@ -17,9 +17,13 @@ Pick = Callable[
 
 # Share of the best test's information within which another one tells as much: then the one that strains the specimens
 # least is played. The prediction of the information itself is not better than that.
-AS_MUCH = 0.1
+AS_MUCH = 0.01
 # Bits below which no test tells anything: it would change a probability of 95 % by less than one point.
 LEAST = 0.01
+
+FROM_THE_LEAST = (
+    "It has the smallest drift, from which the drift may grow by the factor that the limits allow."
+)
 
 CERTAIN, INSEPARABLE, GAP, TESTS, LIMITS, SILENT = (
     "certain",
@@ -40,9 +44,9 @@ def best(options: Sequence[Option], _test: int) -> Option:
     )
 
 
-def strongest(options: Sequence[Option], _test: int) -> Option:
-    """The option with the largest drift."""
-    return max(options, key=lambda one: (one.drift, -one.candidate))
+def least(options: Sequence[Option], _test: int) -> Option:
+    """The option with the smallest drift."""
+    return min(options, key=lambda one: (one.drift, one.candidate))
 
 
 def at_random(seed: int, options: Sequence[Option], test: int) -> Option:
@@ -50,27 +54,28 @@ def at_random(seed: int, options: Sequence[Option], test: int) -> Option:
     return options[int(np.random.default_rng([seed, test]).integers(len(options)))]
 
 
-def choosing(head: GoalTable, pick: Pick = best) -> Choice:
-    """The choice for a goal."""
-    return partial(choose, head, pick)
+def choosing(head: GoalTable, pick: Pick = best, *, gentle: bool = False) -> Choice:
+    """The choice for a goal; a `gentle` campaign begins with the smallest drift."""
+    return partial(choose, head, pick, gentle)
 
 
-def choose(head: GoalTable, pick: Pick, steps: Sequence[Step]) -> DecidedStep | EndedStep:
+def choose(head: GoalTable, pick: Pick, gentle: bool, steps: Sequence[Step]) -> DecidedStep | EndedStep:
     """The next test after the steps of a log, which end with `Begun` or `Diagnosed`, or the end."""
     last = steps[-1]
     if isinstance(last, BegunStep):
-        return first(last)
+        return first(least if gentle else pick, last)
     assert isinstance(last, DiagnosedStep)  # noqa: S101 - no other step asks for a choice
     return end(head, last) or following(pick, steps, last)
 
 
-def first(begun: BegunStep) -> DecidedStep | EndedStep:
-    """The first test: nothing is known yet of the laboratories, so it is the one with the smallest drift."""
+def first(pick: Pick, begun: BegunStep) -> DecidedStep | EndedStep:
+    """The first test."""
     left = [one for one in begun.options if not one.refused]
     if not left:
         return none_left(begun.options)
-    chosen = min(left, key=lambda one: (one.drift, one.candidate))
-    return DecidedStep(1, chosen.candidate, 0.0, "The first test is the one with the smallest drift.")
+    chosen = pick(left, 1)
+    why = FROM_THE_LEAST if pick is least else reason(chosen, left)
+    return DecidedStep(1, chosen.candidate, chosen.bits, why)
 
 
 def end(head: GoalTable, last: DiagnosedStep) -> EndedStep | None:

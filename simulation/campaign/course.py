@@ -16,10 +16,11 @@ from simulation.campaign.steps import (
     Endured,
     InterruptedStep,
     PlayedStep,
+    RecordedStep,
     Step,
 )
 
-Kind = TypeVar("Kind", bound=Step)
+Kind = TypeVar("Kind", bound=Step | RecordedStep)
 
 
 class Actions(Protocol):
@@ -82,7 +83,7 @@ def next_step(steps: Sequence[Step], actions: Actions, choose: Choice) -> Step |
 
 def endured(steps: Sequence[Step]) -> Endured:
     """What the specimens have been through in all tests, those that were interrupted included."""
-    rows = [one for one in steps if isinstance(one, PlayedStep | InterruptedStep)]
+    rows = of(steps, RecordedStep)
     return Endured(max((one.drift for one in rows), default=0.0), sum(one.energy for one in rows))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -17,7 +18,7 @@ from common.roles import MASTER
 from common.signals import shared
 from diagnosis.diagnose import parts_of
 from diagnosis.findings.found import Diagnosis
-from diagnosis.fits import hypothesis
+from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
 from diagnosis.fits.residuals import Data
@@ -32,10 +33,15 @@ from models.ground_motion.motions import load
 from models.registry import Array
 from models.system import System
 from simulation.campaign import information
-from simulation.campaign.hypotheses import HiddenCauses, PartCauses, sight
+from simulation.campaign.hypotheses import HiddenCauses, PartCauses, Sight, sight
 from simulation.campaign.information import Expected
 
 SCARCE = 1e-5  # probability of a hidden cause below which no test is judged by it
+SIZES = (
+    0.5,
+    2.0,
+)  # of the size of a hidden cause, for which it stands: the catalogue gives three over a decade
+TINY = 1e-12  # σ², a change that nothing shows
 
 kept_motion = lru_cache(maxsize=64)(load)
 """The record of a motion; the same few are scaled again and again."""
@@ -68,13 +74,13 @@ def exchanged(found: Mapping[str, Diagnosis], part: PartCauses, fit: Fit) -> dic
     }
 
 
-def rolled_out(plan: Plan, systems: Mapping[str, System]) -> Rollout:
-    """The closed loop of a plan with these laboratories, without noise."""
+def rolled_out(plan: Plan, systems: Mapping[str, System], seed: int | None = None) -> Rollout:
+    """The closed loop of a plan with these laboratories; with a `seed` the sensors have their noise."""
     master, given = systems[MASTER], plan.ground_motion
     motion = kept_motion(given.record, plan.base, given.dt, given.unit)
     ground = substructure.ground_rows(plan, motion, master.effects.time_shift)
     slaves = {role: systems[role] for role in plan.roles}
-    return simulate(master.plan, ground, effects=master.effects, slaves=slaves)
+    return simulate(master.plan, ground, seed=seed, effects=master.effects, slaves=slaves)
 
 
 def recorded(plan: Plan, rollout: Rollout) -> Run:
@@ -98,6 +104,21 @@ def recorded(plan: Plan, rollout: Rollout) -> Run:
 def parts(plan: Plan, rollout: Rollout, role: str) -> dict[str, Part]:
     """The parts of a simulated test by name, as the diagnosis of one slave's role would see them."""
     return {one.name: one for one in parts_of(record.build(recorded(plan, rollout), plan, role=role))}
+
+
+def rehearsed(plan: Plan) -> list[tuple[str, Fit]]:
+    """Fits without effects of the parts of a test in the laboratories as planned, by role of the slave."""
+    systems = laboratories({}, plan)
+    run = recorded(plan, rolled_out(plan, systems, plan.test.seed))
+    found = []
+    for place, role in enumerate(plan.roles or (MASTER,)):
+        own = record.build(run, plan, role=role)
+        for part in parts_of(own):
+            if part.role == role or (place == 0 and part.role == MASTER):
+                found.append(
+                    (role, fitting.at(residuals.prepare(part, own), {}, np.zeros(len(part.nuisances))))
+                )
+    return found
 
 
 def data_of(data: Data, part: Part) -> Data:
@@ -140,28 +161,47 @@ def reduced(data: Data, fit: Fit) -> Array:
 def shown(causes: HiddenCauses, parts_: Sequence[Part | None]) -> Expected:
     """What a test tells about hidden causes; `parts_` are those of the causes' fits in the test.
 
-    A cause that the test would show is told from all others.
+    Sizes of one effect are one cause. A cause is told from another one of its part by what is left of its changes once
+    the other one has been fitted to them, and from those of other parts if the test shows either.
     """
-    problems = [None if one is None else bare(fit, one) for fit, one in zip(causes.fits, parts_, strict=True)]
-    more = np.zeros(len(causes.causes))
-    for place, (cause, before) in enumerate(zip(causes.causes, causes.sights, strict=True)):
-        there = problems[cause.part]
-        if there is None or causes.weights[place + 1] < SCARCE:
+    count = len(causes.causes)
+    more = np.zeros((count, count))
+    for place, (fit, part) in enumerate(zip(causes.fits, parts_, strict=True)):
+        if part is not None:
+            own = [number for number, one in enumerate(causes.causes) if one.part == place]
+            before, there = causes.sights[place], changed(causes, place, bare(fit, part))
+            more[np.ix_(own, own)] = before.beside(there).left() - before.left()
+    names = ["", *(one.name for one in causes.causes)]
+    return information.expected(causes.weights, apart_by_changes(more), names)
+
+
+def changed(causes: HiddenCauses, place: int, there: BarePrediction) -> Sight:
+    """What the causes of a part would change in a simulated test; those that are too improbable count as none."""
+    z = causes.fits[place].z
+    columns = []
+    for one, weight in zip(causes.causes, causes.weights[1:], strict=True):
+        if one.part != place:
             continue
-        fit = causes.fits[cause.part]
-        try:
-            change = (
-                there.data.reduced(hypothesis.lay(there.data, fit.z, cause.values)).ravel() - there.reduced
-            )
-        except InputError:
-            continue
-        least = np.eye(before.slopes.size)
-        both = before.beside(sight(change, there.slopes))
-        more[place] = max(0.0, both.imitated(least) - before.imitated(least))
-    seen = np.concatenate([[0.0], more])
-    apart = np.maximum(seen[:, None], seen[None, :])
-    np.fill_diagonal(apart, 0.0)
-    return information.expected(causes.weights, apart)
+        change = np.zeros_like(there.reduced)
+        if weight >= SCARCE:
+            with contextlib.suppress(InputError):  # an effect that this plan's model cannot have
+                change = there.data.reduced(hypothesis.lay(there.data, z, one.values)).ravel() - there.reduced
+        columns.append(change)
+    return sight(np.stack(columns, axis=1), there.slopes)
+
+
+def apart_by_changes(more: Array) -> Array:
+    """How far apart a test moves nothing (first) and causes, in σ², from the products of what they change (n, n).
+
+    `apart[i, j]` is what is left where i is true and j is tried at the best of the sizes for which it stands.
+    """
+    own = np.clip(np.diag(more), 0.0, None)
+    size = np.clip(more / np.maximum(own, TINY)[None, :], *SIZES)
+    left = own[:, None] - 2.0 * size * more + size**2 * own[None, :]
+    found = np.zeros((own.size + 1, own.size + 1))
+    found[0, 1:] = found[1:, 0] = own
+    found[1:, 1:] = np.maximum(0.0, left)
+    return found
 
 
 class BarePrediction(NamedTuple):

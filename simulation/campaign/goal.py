@@ -99,6 +99,25 @@ class Goal:
         text = json.dumps([head, plain(self.limits), self.plan.digest(), tests], sort_keys=True)
         return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files of the user's that its tests need: records of motion, and kinds of laboratory."""
+        named = (str(one.motion.ground_motion["record"]) for one in self.candidates)
+        kinds = (one.rpartition(":")[0] for one in self.plan.kinds.values())
+        return tuple(
+            dict.fromkeys(
+                [
+                    *(one for one in named if one not in MOTIONS),
+                    *(one for one in kinds if one.endswith(".py")),
+                ]
+            )
+        )
+
+    @property
+    def gentle(self) -> bool:
+        """Whether the first test has the smallest drift, because the drift may only grow from test to test."""
+        return math.isfinite(self.limits.growth)
+
     def candidate(self, number: int) -> CampaignTest:
         """The candidate of a number."""
         return self.candidates[number - 1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -73,14 +73,12 @@ class HiddenCauses:
 
     roles: tuple[str, ...]  # of the slave whose diagnosis judged each part
     fits: tuple[Fit, ...]  # of the parts, without effects
-    causes: tuple[HiddenCause, ...]
-    sights: tuple[Sight, ...]  # of each cause in the tests so far
+    causes: tuple[HiddenCause, ...]  # part by part
+    sights: tuple[Sight, ...]  # of the causes of each part in the tests so far
     weights: Array
-
-    @property
-    def nothing(self) -> float:
-        """The probability that the laboratories are as planned."""
-        return float(self.weights[0])
+    sure: float = (
+        1.0  # probability that the truth is among them: small where a gap is left that no effect explains
+    )
 
 
 def verdicts(found: Mapping[str, Diagnosis]) -> Iterator[tuple[str, PartVerdict]]:
@@ -99,12 +97,10 @@ def open_parts(found: Mapping[str, Diagnosis]) -> list[PartCauses]:
 
 
 def causes_of(role: str, verdict: PartVerdict) -> PartCauses | None:
-    """The causes of one part's gap; None where it has none."""
+    """The causes of one part's gap; None where it has none. No effects are the cause where none comes near."""
     search = verdict.joined or verdict.search
     if verdict.outcome == "unknown":
-        near = [(fit, chance) for fit, chance in verdict.others if fit.names]
-        if not near:
-            return None
+        near = [(fit, chance) for fit, chance in verdict.others if fit.names] or [(search.commissioned, 1.0)]
         joint = {fit.names: fit for fit in search.alternatives}
         fits = [joint.get(fit.names, fit) for fit, _ in near]
         return weighed(role, verdict, fits, np.array([chance for _, chance in near]), 1.0 - DOUBT["unknown"])
@@ -153,14 +149,21 @@ def hidden(found: Mapping[str, Diagnosis]) -> HiddenCauses:
     what the nominal parameters can imitate lowers its probability.
     """
     searches = [(role, verdict.joined or verdict.search) for role, verdict in verdicts(found)]
-    kept = [(role, one.chosen) for role, one in searches if not one.data.part.exact]
+    sure = float(np.prod([one.sure for one in open_parts(found)]))
+    return replace(hiding([(role, one.chosen) for role, one in searches], played=True), sure=sure)
+
+
+def hiding(fits_: Sequence[tuple[str, Fit]], *, played: bool) -> HiddenCauses:
+    """The effects that fits without effects, by role of the slave, leave possible; all of them before any test."""
+    kept = [(role, fit) for role, fit in fits_ if not fit.data.part.exact]
     roles, fits = tuple(role for role, _ in kept), tuple(fit for _, fit in kept)
-    causes = [cause for place, fit in enumerate(fits) for cause in sized(place, fit)]
-    sights = [seen(fits[one.part], one) for one in causes]
-    shown = np.array([one.imitated(np.eye(one.slopes.size)) for one in sights])
-    each = DIFFERENT / max(1, len(causes))
-    weights = np.concatenate([[1.0 - DIFFERENT], each * odds(shown)])
-    return HiddenCauses(roles, fits, tuple(causes), tuple(sights), weights / weights.sum())
+    causes = [[*sized(place, fit)] for place, fit in enumerate(fits)]
+    sights = [seen(fit, own) if played else unseen(fit, own) for fit, own in zip(fits, causes, strict=True)]
+    shown = [np.diag(one.left()) for one in sights]
+    each = DIFFERENT / max(1, sum(map(len, causes)))
+    weights = np.concatenate([[1.0 - DIFFERENT], each * odds(np.concatenate([np.zeros(0), *shown]))])
+    flat = tuple(one for own in causes for one in own)
+    return HiddenCauses(roles, fits, flat, tuple(sights), weights / weights.sum())
 
 
 def sized(place: int, fit: Fit) -> Iterator[HiddenCause]:
@@ -177,27 +180,33 @@ def sized(place: int, fit: Fit) -> Iterator[HiddenCause]:
 
 
 class Sight(NamedTuple):
-    """What an effect changes in recordings, and how far nominal parameters can imitate it, as normal equations."""
+    """What the causes of a part change in recordings, and how far nominal parameters can imitate it."""
 
-    square: float  # sum of the squared changes, in σ²
-    slopes: Array  # (nuisances,) slopes of the nominal parameters times the changes
+    squares: Array  # (causes, causes) sums of products of the changes, in σ²
+    slopes: Array  # (nuisances, causes) slopes of the nominal parameters times the changes
     known: Array  # (nuisances, nuisances) information on the nominal parameters
 
     def beside(self, other: Sight) -> Sight:
         """Both recordings together."""
-        return Sight(self.square + other.square, self.slopes + other.slopes, self.known + other.known)
+        return Sight(self.squares + other.squares, self.slopes + other.slopes, self.known + other.known)
 
-    def imitated(self, least: Array) -> float:
-        """What remains of the squared changes beyond what nominal parameters of information `least` can imitate."""
-        return max(0.0, self.square - float(self.slopes @ np.linalg.solve(self.known + least, self.slopes)))
-
-
-def sight(change: Array, slopes: Array) -> Sight:
-    """The sight of changes (m,), with slopes (m, nuisances) of the nominal parameters."""
-    return Sight(float(change @ change), slopes.T @ change, slopes.T @ slopes)
+    def left(self) -> Array:
+        """What remains of `squares` once the nominal parameters are fitted within their tolerances."""
+        least = np.eye(len(self.known))
+        return np.asarray(self.squares - self.slopes.T @ np.linalg.solve(self.known + least, self.slopes))
 
 
-def seen(fit: Fit, cause: HiddenCause) -> Sight:
-    """What an effect would have changed in the recordings of a fit without effects."""
-    change = fitting.at(fit.data, cause.values, fit.z).reduced - fit.reduced
-    return sight(change.ravel(), fit.jacobian)
+def sight(changes: Array, slopes: Array) -> Sight:
+    """The sight of changes (m, causes), with slopes (m, nuisances) of the nominal parameters."""
+    return Sight(changes.T @ changes, slopes.T @ changes, slopes.T @ slopes)
+
+
+def seen(fit: Fit, causes: Sequence[HiddenCause]) -> Sight:
+    """What effects would have changed in the recordings of a fit without effects."""
+    changes = [(fitting.at(fit.data, one.values, fit.z).reduced - fit.reduced).ravel() for one in causes]
+    return sight(np.stack(changes, axis=1) if changes else np.zeros((fit.reduced.size, 0)), fit.jacobian)
+
+
+def unseen(fit: Fit, causes: Sequence[HiddenCause]) -> Sight:
+    """The sight of causes that no test could show yet."""
+    return sight(np.zeros((0, len(causes))), np.zeros((0, fit.z.size)))

@@ -7,6 +7,7 @@ expected fall of their entropy (D. V. Lindley, Annals of Mathematical Statistics
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -30,12 +31,18 @@ def odds(costs: Array) -> Array:
     return np.asarray(np.exp(-np.clip(costs / (2.0 * TEMPERATURE), 0.0, 700.0)))
 
 
-def expected(weights: Array, apart: Array) -> Expected:
-    """The information of a test on hypotheses of probabilities `weights` (h,), which sum to 1; `apart` (h, h)."""
-    after = weights * odds(apart)
+def expected(weights: Array, apart: Array, names: Sequence[str] = ()) -> Expected:
+    """The information of a test on hypotheses of probabilities `weights` (h,), which sum to 1; `apart` (h, h).
+
+    Hypotheses of one of the `names` (h,) are one cause; without names each is a cause of its own.
+    """
+    places = np.unique(names, return_inverse=True)[1] if names else np.arange(weights.size)
+    after = weights * odds(apart * (places[:, None] != places[None, :]))
     after /= after.sum(axis=1, keepdims=True)
-    bits = entropy(weights[None]) - weights @ entropy(after)
-    return Expected(float(bits[0]), float(weights @ np.diag(after)))
+    same = np.equal.outer(places, np.arange(places.max() + 1)).astype(np.float64)
+    bits = entropy(weights[None] @ same) - weights @ entropy(after @ same)
+    true = np.sum((after @ same) * same, axis=1)
+    return Expected(float(bits[0]), float(weights @ true))
 
 
 def together(parts: list[Expected]) -> Expected:

@@ -57,27 +57,29 @@ class DecidedStep:
 
 
 @dataclass(frozen=True)
-class InterruptedStep:
-    """A test in real time did not reach its end because this program was ended; what its recording holds."""
+class RecordedStep:
+    """What the recording of a test holds."""
 
-    step: ClassVar[str] = "interrupted"
     test: int
     file: str
-    drift: float
-    energy: float
+    drift: float  # m, the largest of any storey
+    energy: float  # J, that a specimen absorbed, the largest of several
 
 
 @dataclass(frozen=True)
-class PlayedStep:
+class InterruptedStep(RecordedStep):
+    """A test in real time did not reach its end because this program was ended."""
+
+    step: ClassVar[str] = "interrupted"
+
+
+@dataclass(frozen=True)
+class PlayedStep(RecordedStep):
     """A test was played."""
 
     step: ClassVar[str] = "played"
-    test: int
-    file: str
     digest: str
     outcome: str
-    drift: float  # m, the largest of any storey
-    energy: float  # J, that a specimen absorbed, the largest of several
 
 
 @dataclass(frozen=True)

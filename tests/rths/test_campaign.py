@@ -21,6 +21,7 @@ reality = "hidden.toml"
 tests = 4
 [limits]
 drift = "15 mm"
+growth = 30
 [[candidate]]
 record = "loma_prieta_1989_corralitos_000"
 scales = [0.01, 0.1, 0.2]

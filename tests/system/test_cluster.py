@@ -1,4 +1,4 @@
-"""Sweeps over a Dask cluster: two machines as network namespaces, without a common file system; one is killed."""
+"""Work over a Dask cluster: two machines as network namespaces, without a common file system; one is killed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -95,18 +96,19 @@ def parts(user: Path, table: str) -> int:
     return len(list((user / f"{table}.parts").glob("*.arrow")))
 
 
-def wait_for(command: subprocess.Popen[bytes], user: Path, table: str, least: int) -> None:
+def wait_for(
+    command: subprocess.Popen[bytes], user: Path, table: str, least: int, log: str = "spread.parquet"
+) -> None:
     until = time.monotonic() + HANG_S
     while parts(user, table) < least:
         late = time.monotonic() > until or command.poll() is not None
-        assert not late, (user / f"{table}.log").read_text()
+        assert not late, (user / f"{log}.log").read_text()
         time.sleep(0.02)
 
 
-@pytest.mark.timeout(600)
-def test_a_killed_worker_and_a_killed_command_lose_no_row_and_repeat_none(
-    machines: tuple[str, str], user: Path, tmp_path: Path
-) -> None:
+@pytest.fixture
+def cluster(machines: tuple[str, str], user: Path, tmp_path: Path) -> Iterator[Cluster]:
+    """A scheduler on the first machine and a worker on each; all that a test starts is ended after it."""
     first, second = machines
     scheduler = start(
         first,
@@ -117,28 +119,81 @@ def test_a_killed_worker_and_a_killed_command_lose_no_row_and_repeat_none(
     running = [scheduler]
     try:
         running += [worker(first, user, tmp_path), worker(second, user, tmp_path)]
-        ended(alone := sweep(first, user, "alone.parquet"), user / "alone.parquet.log")
-        running.append(alone)
-
-        command = sweep(first, user, "spread.parquet", "--dask", SCHEDULER)
-        running.append(command)
-        wait_for(command, user, "spread.parquet", 3)
-        kill(running[2])
-        wait_for(command, user, "spread.parquet", 6)
-        kill(command)
-        there = parts(user, "spread.parquet")
-        assert 6 <= there < ROWS // 64
-
-        running.append(worker(second, user, tmp_path / "again"))
-        again = sweep(first, user, "spread.parquet", "--dask", SCHEDULER, "--json")
-        running.append(again)
-        ended(again, user / "spread.parquet.log")
-        assert (user / "spread.parquet").read_bytes() == (user / "alone.parquet").read_bytes()
-        assert not (user / "spread.parquet.parts").exists()
+        yield Cluster(first, second, running)
     finally:
         for process in running:
             process.kill()
             process.wait()
+
+
+class Cluster(NamedTuple):
+    """Two machines, and what runs there: the scheduler, a worker on each, and what a test added."""
+
+    first: str
+    second: str
+    running: list[subprocess.Popen[bytes]]
+
+    def begun(self, process: subprocess.Popen[bytes]) -> subprocess.Popen[bytes]:
+        """A process that is ended with the others."""
+        self.running.append(process)
+        return process
+
+
+@pytest.mark.timeout(600)
+def test_a_killed_worker_and_a_killed_command_lose_no_row_and_repeat_none(
+    cluster: Cluster, user: Path, tmp_path: Path
+) -> None:
+    first, second, running = cluster
+    ended(cluster.begun(sweep(first, user, "alone.parquet")), user / "alone.parquet.log")
+
+    command = cluster.begun(sweep(first, user, "spread.parquet", "--dask", SCHEDULER))
+    wait_for(command, user, "spread.parquet", 3)
+    kill(running[2])
+    wait_for(command, user, "spread.parquet", 6)
+    kill(command)
+    there = parts(user, "spread.parquet")
+    assert 6 <= there < ROWS // 64
+
+    cluster.begun(worker(second, user, tmp_path / "again"))
+    again = cluster.begun(sweep(first, user, "spread.parquet", "--dask", SCHEDULER, "--json"))
+    ended(again, user / "spread.parquet.log")
+    assert (user / "spread.parquet").read_bytes() == (user / "alone.parquet").read_bytes()
+    assert not (user / "spread.parquet.parts").exists()
+
+
+GOAL = """
+[[candidate]]
+scales = [0.02, 0.1]
+durations = 5.0
+"""
+PROOFS = {
+    "blind": ("blind", "--cases", "5", "--set", "tune", "--duration", "6"),
+    "benchmark2020": ("benchmark2020", "--plants", "1", "--only", "sample"),
+    "campaign": ("campaign", "goal.toml", "--compare-random", "4", "--set", "tune"),
+}
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("name", PROOFS)
+def test_a_proof_whose_worker_is_killed_gives_the_table_of_one_machine(
+    cluster: Cluster, user: Path, name: str
+) -> None:
+    (user / "goal.toml").write_text(GOAL)
+    words = [str(user / word) if word.endswith(".toml") else word for word in PROOFS[name]]
+
+    def begun(folder: str, *more: str) -> subprocess.Popen[bytes]:
+        command = (sys.executable, "-m", "rths", *words, "-o", user / folder, *more)
+        return cluster.begun(start(cluster.first, *map(str, command), log=user / f"{folder}.log"))
+
+    code = begun("alone", "--jobs", "1").wait(HANG_S)
+    assert code in (0, 1), (user / "alone.log").read_text()
+    spread = begun("spread", "--dask", SCHEDULER)
+    wait_for(spread, user, "spread/results.parquet", 1, "spread")
+    kill(cluster.running[2])
+    ended(spread, user / "spread.log", code)
+    tables = [(user / folder / "results.parquet").read_bytes() for folder in ("alone", "spread")]
+    assert tables[0] == tables[1]
+    assert not (user / "spread" / "results.parquet.parts").exists()
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:

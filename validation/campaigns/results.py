@@ -13,7 +13,7 @@ from report.text.formats import percent
 from simulation.campaign.goal import Goal
 from validation.campaigns.compare import ComparedCase, PlayedCampaign
 
-# The goal: chosen tests over random ones, after the first test, which is the same for both.
+# The goal: chosen tests over random ones.
 HALF = 0.5
 
 
@@ -21,8 +21,8 @@ def summary(goal: Goal, cases: Sequence[ComparedCase]) -> dict[str, Any]:
     """The figures; a ratio is None where there is nothing to count.
 
     `both`: laboratories in which all campaigns ended certain of the right cause; `open`: those of them in which the
-    first test was not enough. `all`: every laboratory in which one campaign ended so; another one counts as all tests
-    that the goal allows.
+    test with the smallest drift would not have been enough. `all`: every laboratory in which one campaign ended so;
+    another one counts as all tests that the goal allows.
     """
     both = [one for one in cases if one.chosen.right and all(each.right for each in one.random)]
     some = [one for one in cases if one.chosen.right or any(each.right for each in one.random)]
@@ -32,14 +32,9 @@ def summary(goal: Goal, cases: Sequence[ComparedCase]) -> dict[str, Any]:
         "random": {"right": share([each for one in cases for each in one.random])}
         | wrong([each for one in cases for each in one.random]),
         "both": counts(both, goal.head.tests),
-        "open": counts([one for one in both if not decided(one)], goal.head.tests),
+        "open": counts([one for one in both if not one.gentle], goal.head.tests),
         "all": counts(some, goal.head.tests),
     }
-
-
-def decided(one: ComparedCase) -> bool:
-    """Whether the first test, which is the same for all campaigns, was enough."""
-    return one.chosen.tests <= 1
 
 
 def share(played: Sequence[PlayedCampaign]) -> float:
@@ -53,16 +48,13 @@ def wrong(played: Sequence[PlayedCampaign]) -> dict[str, float]:
 
 
 def counts(cases: Sequence[ComparedCase], most: int) -> dict[str, float | int | None]:
-    """Mean tests with chosen and with random ones, in all and after the first, and their ratios."""
+    """Mean tests with chosen and with random ones, and their ratio."""
     chosen = [until(one.chosen, most) for one in cases]
     random = [float(np.mean([until(each, most) for each in one.random])) for one in cases]
-    found: dict[str, float | int | None] = {"laboratories": len(cases), "chosen": None, "random": None}
-    found |= {"ratio": None, "ratio_after_first": None}
-    if cases:
-        one, other = float(np.mean(chosen)), float(np.mean(random))
-        found |= {"chosen": one, "random": other, "ratio": one / other}
-        found["ratio_after_first"] = (one - 1.0) / (other - 1.0) if other > 1.0 else None
-    return found
+    if not cases:
+        return {"laboratories": 0, "chosen": None, "random": None, "ratio": None}
+    one, other = float(np.mean(chosen)), float(np.mean(random))
+    return {"laboratories": len(cases), "chosen": one, "random": other, "ratio": one / other}
 
 
 def until(one: PlayedCampaign, most: int) -> int:
@@ -101,7 +93,7 @@ def sentences(goal: Goal, cases: Sequence[ComparedCase]) -> list[str]:
     ]
     texts = {
         "both": "Where all campaigns were certain of the right cause",
-        "open": "Of these, where the first test was not enough",
+        "open": "Of these, where the test with the smallest drift is not enough",
         "all": f"Where one was at least, the others counting as {goal.head.tests} tests",
     }
     for name, text in texts.items():
@@ -109,12 +101,9 @@ def sentences(goal: Goal, cases: Sequence[ComparedCase]) -> list[str]:
         if not one["laboratories"]:
             found.append(f"{text}: no laboratory.")
             continue
-        after = (
-            "" if one["ratio_after_first"] is None else f", {one['ratio_after_first']:.2f} after the first"
-        )
         found.append(
             f"{text} ({one['laboratories']} laboratories): {one['chosen']:.2f} chosen tests, {one['random']:.2f} "
-            f"random tests, ratio {one['ratio']:.2f}{after}."
+            f"random tests, ratio {one['ratio']:.2f}."
         )
     return found
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulation.campaign import choice, information
+from simulation.campaign import choice, expected, information
 from simulation.campaign.goal import GoalTable
 from simulation.campaign.steps import (
     BegunStep,
@@ -23,7 +23,7 @@ from simulation.campaign.steps import (
 HEAD = GoalTable(tests=4)
 OPTIONS = (
     Option(1, 0.001, 0.0, "", 0.10, 0.7),
-    Option(2, 0.004, 0.0, "", 0.95, 0.9),
+    Option(2, 0.004, 0.0, "", 0.992, 0.9),
     Option(3, 0.009, 0.0, "", 1.00, 0.9),
     Option(4, 0.020, 0.0, "the drift would pass 0.01 m", 1.40, 0.9),
 )
@@ -45,22 +45,26 @@ def diagnosed(**more: Any) -> DiagnosedStep:
 
 
 def following(
-    *steps: Step, head: GoalTable = HEAD, pick: choice.Pick = choice.best
+    *steps: Step, head: GoalTable = HEAD, pick: choice.Pick = choice.best, gentle: bool = False
 ) -> DecidedStep | EndedStep:
-    return choice.choosing(head, pick)(steps)
+    return choice.choosing(head, pick, gentle=gentle)(steps)
 
 
-def test_the_first_test_is_the_one_with_the_smallest_drift() -> None:
-    found = following(BegunStep("", "", tuple(reversed(OPTIONS))))
+@pytest.mark.parametrize(("gentle", "candidate"), [(True, 1), (False, 2)])
+def test_the_first_test_tells_most_but_a_gentle_campaign_begins_with_the_smallest_drift(
+    gentle: bool, candidate: int
+) -> None:
+    found = following(BegunStep("", "", tuple(reversed(OPTIONS))), gentle=gentle)
     assert isinstance(found, DecidedStep)
-    assert (found.test, found.candidate) == (1, 1)
+    assert (found.test, found.candidate) == (1, candidate)
+    assert ("smallest drift, from which" in found.why) == gentle
 
 
 def test_among_equally_informative_tests_the_one_with_the_smallest_drift_is_chosen() -> None:
     found = following(diagnosed())
     assert isinstance(found, DecidedStep)
-    assert (found.test, found.candidate, found.bits) == (2, 2, 0.95)
-    assert "0.95 bits" in found.why
+    assert (found.test, found.candidate, found.bits) == (2, 2, 0.992)
+    assert "0.99 bits" in found.why
 
 
 def test_tests_beyond_the_limits_and_played_tests_are_not_chosen() -> None:
@@ -117,6 +121,24 @@ def test_a_test_that_separates_two_causes_with_certainty_gives_their_entropy() -
     assert list(information.expected(np.array([0.5, 0.5]), far)) == pytest.approx([1.0, 1.0])
     rare = information.expected(np.array([0.9, 0.1]), far)
     assert rare.bits == pytest.approx(-0.9 * np.log2(0.9) - 0.1 * np.log2(0.1))
+
+
+def test_hypotheses_of_one_name_are_one_cause() -> None:
+    """Two sizes of one effect need not be told apart."""
+    weights, far = np.array([0.5, 0.3, 0.2]), 1e4 * (1.0 - np.eye(3))
+    one = information.expected(weights, far, ["", "a", "a"])
+    assert list(one) == pytest.approx([1.0, 1.0])
+
+
+def test_causes_that_change_the_readings_alike_at_another_size_are_not_told_apart() -> None:
+    """Rows: nothing, a cause, the same change at 1.5 and at 10 times the size, and another change."""
+    changes = np.array([[1.0, 0.0], [1.5, 0.0], [10.0, 0.0], [0.0, 2.0]])
+    found = expected.apart_by_changes(changes @ changes.T)
+    assert found[0].tolist() == pytest.approx([0.0, 1.0, 2.25, 100.0, 4.0])
+    assert found[1].tolist() == pytest.approx(
+        [1.0, 0.0, 0.0, 16.0, 2.0]
+    )  # sizes from half to twice are tried
+    assert found[:, 0].tolist() == found[0].tolist()
 
 
 def test_a_test_that_separates_no_causes_gives_no_information() -> None:

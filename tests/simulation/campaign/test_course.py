@@ -208,7 +208,7 @@ def test_a_campaign_played_by_hand_waits_for_each_recording_and_continues_with_i
         assert isinstance(again, DecidedStep)
         assert again.test == 2
         with pytest.raises(
-            InputError, match=r"is not of the test that is next: scale in \[ground_motion\] is 0.01"
+            InputError, match=r"is not of the test that is next: scale in \[ground_motion\] is 0.03"
         ):
             actions.take(own, again, tmp_path, found.plan(again))
 
