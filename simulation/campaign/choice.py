@@ -16,7 +16,7 @@ Pick = Callable[
 ]  # of the options that may be played, for the test of a number
 
 # Share of the best test's information within which another one tells as much: then the one that strains the specimens
-# least is played. The prediction of the information itself is not better than that.
+# least is played. More would leave weak effects unseen, for which a clean laboratory then needs a further test.
 AS_MUCH = 0.01
 # Bits below which no test tells anything: it would change a probability of 95 % by less than one point.
 LEAST = 0.01

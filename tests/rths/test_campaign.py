@@ -91,6 +91,31 @@ def test_a_campaign_that_is_killed_and_continued_gives_the_same_result(
     assert "hidden.toml" not in page + (folder / LOG).read_text()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_campaign_in_real_time_that_is_ended_in_a_test_continues(
+    number: signal.Signals, tmp_path: Path, capsys: Any, call: Any
+) -> None:
+    goal = GOAL.replace("tests = 4", 'tests = 1\nmode = "real time"').replace("[0.01, 0.1, 0.2]", "[0.01]")
+    path, folder = written(tmp_path, goal), tmp_path / "campaign"
+    words = [sys.executable, "-m", "rths", "campaign", str(path), "-o", str(folder)]
+    with subprocess.Popen(words, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert any(line.startswith("t ") for line in process.stderr), "the test did not begin"
+        process.send_signal(number)
+        said = process.stderr.read().splitlines()
+        code = process.wait(PATIENCE)
+    assert code == (3 if number == signal.SIGINT else -number)
+    if number == signal.SIGINT:
+        assert said[-1] == "rths: stopped by the user (SIGINT)."
+    assert call("campaign", path, "-o", folder) == 1
+    assert "All 1 tests are played" in capsys.readouterr().out
+    assert [one["step"] for one in steps(folder)] == [
+        "begun", "decided", "interrupted", "played", "diagnosed", "ended",
+    ]  # fmt: skip
+    assert (folder / "test-01-interrupted-1.mcap").is_file()
+
+
 def steps(folder: Path) -> list[dict[str, Any]]:
     """The steps of a log; recordings hold the time of day, and so have a digest of their own."""
     found = [json.loads(line) for line in (folder / LOG).read_text().splitlines()]
