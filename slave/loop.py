@@ -78,6 +78,7 @@ class SlaveLoop(RigLoop):
         self._tally = Tally(setting.plan.ticks, setting.plan.window)
         self._feedbacks = 0  # number of feedbacks sent
         self._master_ticks = 0  # number of ticks that the master has run, by its Stop
+        self._awaited_end: Stop | None = None  # the master's end, until this laboratory has caught up with it
 
     # -- messages ---------------------------------------------------------------------------------
 
@@ -136,7 +137,10 @@ class SlaveLoop(RigLoop):
         self._handshake.poll()
 
     def _stop(self, request: Stop) -> None:
-        if self.lab.exchange.allows(Event.STOP):
+        """End in order with the master; an emulated laboratory that is behind first runs the ticks that it lacks."""
+        behind = self.lab.running and self.ticks < request.ticks
+        self._awaited_end = request if behind and self.lab.plan.emulated else None
+        if self._awaited_end is None and self.lab.exchange.allows(Event.STOP):
             self.lab.exchange.happen(Event.STOP, remote=True, cause=request.reason)
             self._master_ticks = request.ticks
             if not self.completed:
@@ -186,6 +190,8 @@ class SlaveLoop(RigLoop):
             return
         self._answer(tick, now, measured, wanted)
         self.ticks = tick + 1
+        if self._awaited_end is not None:
+            self._stop(self._awaited_end)
         if lab.running and now - lab.heard_ns > lab.loss_ns:
             lab.lost("The master", lab.plan.link.loss_timeout, tick)
 

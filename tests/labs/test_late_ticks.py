@@ -19,7 +19,7 @@ from common.recording.run import Run
 from common.roles import MASTER, SLAVE
 from common.terminal import cli
 from report.facts.summary import summarize
-from tests.helpers import ROOT
+from tests.helpers import PATIENT, ROOT
 from validation.faults.lab import Simulation, Surrounding
 
 EMULATED = parse("[test]\nduration = 2.6\n", Path())
@@ -78,6 +78,17 @@ def test_an_emulated_test_tolerates_the_dampers_swing_while_the_master_pauses_fo
     assert run.metadata["summary"]["cause"] == "completed"
     stroke = np.max(np.abs(run.columns["slave"]["damper_stroke"]))
     assert patience.standard("limits.damper_stroke") < stroke < EMULATED.limits.damper_stroke
+
+
+@pytest.mark.parametrize("tables", ["", PATIENT], ids=["late ticks caught up", "late ticks held"])
+def test_an_emulated_slave_that_is_behind_when_the_master_ends_runs_its_last_ticks(
+    tables: str, tmp_path: Path
+) -> None:
+    plan = parse(f"[test]\nduration = 0.5\n{tables}", Path())
+    run = played(plan, tmp_path / "a.mcap", {SLAVE: (0.48,)}, seconds=0.5)
+    summary = summarize(run)
+    assert summary["recorder"]["cause"] == "completed"
+    assert all(facts["missing"] == 0 for facts in summary["topics"].values())
 
 
 # a plan, its slave, and the limits on how the command of that slave moves, beside a rig
