@@ -161,6 +161,7 @@ def test_a_killed_worker_and_a_killed_command_lose_no_row_and_repeat_none(
     assert not (user / "spread.parquet.parts").exists()
 
 
+PATIENCE = 400.0  # s, for a proof that hangs: alone on a slow machine it takes two minutes
 GOAL = """
 [[candidate]]
 scales = [0.02, 0.1]
@@ -185,12 +186,12 @@ def test_a_proof_whose_worker_is_killed_gives_the_table_of_one_machine(
         command = (sys.executable, "-m", "rths", *words, "-o", user / folder, *more)
         return cluster.begun(start(cluster.first, *map(str, command), log=user / f"{folder}.log"))
 
-    code = begun("alone", "--jobs", "1").wait(HANG_S)
-    assert code in (0, 1), (user / "alone.log").read_text()
+    done = (0, 1)  # of a few cases some may miss a goal, of time as well
+    assert begun("alone", "--jobs", "1").wait(PATIENCE) in done, (user / "alone.log").read_text()
     spread = begun("spread", "--dask", SCHEDULER)
     wait_for(spread, user, "spread/results.parquet", 1, "spread")
     kill(cluster.running[2])
-    ended(spread, user / "spread.log", code)
+    assert spread.wait(PATIENCE) in done, (user / "spread.log").read_text()
     tables = [(user / folder / "results.parquet").read_bytes() for folder in ("alone", "spread")]
     assert tables[0] == tables[1]
     assert not (user / "spread" / "results.parquet.parts").exists()
