@@ -14,6 +14,8 @@ import pytest
 from common.errors import InterlockError
 from common.recording.reader import read
 from common.recording.run import PEAKS
+from diagnosis.findings.gaps import held_out
+from diagnosis.recorded import record
 from diagnosis.report.schema import schema
 from tests.diagnosis.cases import Cases, play, short
 from tests.helpers import with_table
@@ -60,8 +62,10 @@ def test_diagnose_writes_report_page_and_summary(
     assert report["details"]["test"]["file"] == path.name
     assert report["found"] == str(reality)
     assert tomllib.loads(reality.read_text(encoding="utf-8"))["found"]["recording"] == path.name
-    assert call("simulate", "default", "--duration", 1, "--reality", reality) == 0
+    corrected = tmp_path / "corrected.mcap"
+    assert call("simulate", "default", "--duration", 8, "--reality", reality, "-o", corrected) == 0
     capsys.readouterr()
+    assert left(path, corrected) == report["how_far"]["after"]  # to the last bit
     assert call("simulate", "rc_column", "--duration", 1, "--reality", reality) == 2
     sentence(capsys, "it was found with other nominal models than this plan's")
     assert "damper" in report["verdict"]
@@ -71,6 +75,16 @@ def test_diagnose_writes_report_page_and_summary(
     assert str(path.parent) not in page
     assert call("diagnose", path, "--json", "-") == 0
     assert json.loads(capsys.readouterr().out) == report | {"found": None}
+
+
+def left(measured: Path, simulated: Path) -> float:
+    """The gap of the response between two recordings, on the time that no fit used."""
+    one, other = (record.build(read(path)) for path in (measured, simulated))
+    held, gaps = held_out(one), []
+    for name in one.responses:
+        there, shown = one.signals[name][held], other.signals[name][held]
+        gaps.append(np.sqrt(np.mean(np.square(there - shown)) / np.mean(np.square(there))))
+    return float(np.sqrt(np.mean(np.square(gaps))))
 
 
 @pytest.mark.slow
