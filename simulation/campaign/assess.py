@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from itertools import islice, product
 from typing import NamedTuple
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from common.plan.plan import Plan
 from diagnosis.findings.found import Diagnosis
@@ -45,8 +47,15 @@ def nominal(goal: Goal) -> tuple[Option, ...]:
     The laboratories are as planned, and their sensors' noise is that of the first candidate's simulation.
     """
     plan = plan_of(goal, 1, 1)
-    known = HiddenState({}, hypotheses.hiding(expected.rehearsed(plan), played=False))
-    return tuple(looked_at(goal, known, 1, Endured())[0])
+    with one_thread():
+        known = HiddenState({}, hypotheses.hiding(expected.rehearsed(plan), played=False))
+        return tuple(looked_at(goal, known, 1, Endured())[0])
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """One BLAS thread: sums over several differ in their last bits with the number of threads."""
+    found: AbstractContextManager[object] = threadpool_limits(limits=1, user_api="blas")
+    return found
 
 
 def tests(goal: Goal, test: int) -> Iterator[tuple[CampaignTest, Plan]]:
@@ -57,15 +66,17 @@ def tests(goal: Goal, test: int) -> Iterator[tuple[CampaignTest, Plan]]:
 
 def knowledge(found: Found) -> NamedState | HiddenState:
     """What the diagnosis of all tests so far says of the cause."""
-    named = any(fit.names for part in hypotheses.open_parts(found) for fit in part.fits)
-    if named or in_samples(found):
-        return NamedState(found)
-    return HiddenState(found, hypotheses.hidden(found))
+    with one_thread():
+        named = any(fit.names for part in hypotheses.open_parts(found) for fit in part.fits)
+        if named or in_samples(found):
+            return NamedState(found)
+        return HiddenState(found, hypotheses.hidden(found))
 
 
 def assessed(goal: Goal, known: NamedState | HiddenState, test: int, endured: Endured) -> Assessment:
     """What each candidate would add to what is known, as the test of this number."""
-    options, apart = looked_at(goal, known, test, endured)
+    with one_thread():
+        options, apart = looked_at(goal, known, test, endured)
     same, together = known.inseparable(apart)
     return Assessment(same, together, tuple(options))
 
