@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -55,7 +55,11 @@ CLASSES = 8
 
 
 def details(
-    found: Diagnosis, far: Response, which: Sequence[Candidate], tests: Sequence[ChosenTest]
+    found: Diagnosis,
+    far: Response,
+    which: Sequence[Candidate],
+    tests: Sequence[ChosenTest],
+    signs: Mapping[str, float],
 ) -> Details:
     """Everything that a page shows beside the report itself."""
     record, strange = found.record, unknowns(found)
@@ -67,6 +71,7 @@ def details(
         force_path=force_path(record),
         loop_shares=far.loop_shares,
         candidates=tuple(candidate(found, entry) for entry in which if entry.effects),
+        signs=signs,
         ceiling=ceilings(found),
         curves=tuple(item for verdict in found.verdicts for item in curves(found, verdict)),
         waterfall=far.waterfall,

@@ -22,6 +22,9 @@ CONVERTER = 7e-4
 QUIETEST = 0.4
 # Relative error, 95 % of the noise levels found in white noise: 2.3 % in 40 s at 2 ms, 3.5 % in 10 s.
 NOISE_ERROR = 0.03
+STEP_ERROR = (
+    1e-9  # relative error of a step: far more than the rounding of floats, far less than anything of interest
+)
 # Least common noise of all sensors as a share of the planned one: below it they count as free of noise.
 LEAST_SCALE = 1e-3
 # Share of repeated samples from which on a sensor misses samples (two equal samples of normal noise are impossible in
@@ -147,9 +150,8 @@ def findings(
         noise = planned.get(name, 0.0) * usual
         if step > max(noise, SAME * coarse.get(name, 0.0)):
             size = step / np.sqrt(12.0) / noise if noise > 0.0 else 0.0
-            result.append(
-                SensorFinding(effect_on(record, name, "quantization"), "step", step, (step, step), size)
-            )
+            bounds = ((1.0 - STEP_ERROR) * step, (1.0 + STEP_ERROR) * step)
+            result.append(SensorFinding(effect_on(record, name, "quantization"), "step", step, bounds, size))
     if not record.has("displacement"):  # the plan's sensors may be another laboratory's
         return result
     for name, ratio in ratios.items():

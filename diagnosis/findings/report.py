@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import details, exercise, how_far, next_test, parts_table, rest, where
+from diagnosis.findings import details, exercise, how_far, next_test, parts_table, rest, trust, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.which import which
 from diagnosis.recorded.nuisances import LoggedForce, LoggedReadings
@@ -56,7 +56,7 @@ def build(
         next_test=next_test.sentence(tests),
         warnings=(*found.warnings, *far.warnings, *named.warnings, *([] if shrunk else [OPEN]), *doubts),
         parts=parts_table.parts(found, require),
-        details=details.details(found, far, named.candidates, tests),
+        details=details.details(found, far, named.candidates, tests, trust.signs(found)),
     )
     return Judged(whole, found)
 

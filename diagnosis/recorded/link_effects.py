@@ -28,6 +28,7 @@ REAL = 0.1  # of an interval: scatter and delay of which a real clock's time sta
 QUICK = 0.25  # of an interval, most of the clocks' error that is taken away from a delay: a fast network's own delay
 CLEAR = 2.5  # errors, of two standard deviations each, by which a delay must exceed zero
 SYMMETRIC = 0.5  # skewness up to which the constant part of a delay is its mean, not its minimum; an exponential has 2
+STAMP = 1e-9  # s: stamps are whole nanoseconds, so that a difference of two is known to one
 
 
 def findings(found: LinkAccount, interval: float) -> list[LinkFinding]:
@@ -69,7 +70,7 @@ def delayed(found: LinkAccount, interval: float) -> LinkFinding | None:
     if not parts:
         return None
     value = float(np.mean([part for part, _ in parts]))
-    error = max(error for _, error in parts)
+    error = max(error for _, error in parts) + STAMP
     if found.virtual:
         there = value > max(CLEAR * error, TINY)
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -291,6 +292,9 @@ class Details(Entry):
         "Shares of the sites in the gap of the closed loop", default=()
     )
     candidates: tuple[Evidence, ...] = noted("The candidates with evidence", default=())
+    signs: Mapping[str, Number] = noted(
+        "What the verdict's probability was learned from, by name; empty where nothing is named", default=dict
+    )
     ceiling: tuple[Ceiling, ...] = noted("What could be explained at all, by part", default=())
     curves: tuple[NaturalCurve, ...] = noted("Relations in natural coordinates", default=())
     waterfall: tuple[Step, ...] = noted("The overall gap, step by step", default=())

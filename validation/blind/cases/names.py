@@ -33,6 +33,7 @@ class Heard:
     sets: tuple[frozenset[str], ...]  # of effects that cannot be separated
     site: str  # the first, empty for none
     closed: float | None
+    signs: Mapping[str, float]  # from which the probability follows
 
 
 class CaseNames:
@@ -82,6 +83,7 @@ class CaseNames:
             tuple(frozenset(map(whole, names)) for names in report.equivalent),
             whole(report.where[0].site) if report.where else "",
             report.how_far.closed,
+            {name: value for name, value in report.details.signs.items() if value is not None},
         )
 
     def _heard(self, role: str, name: str) -> str:

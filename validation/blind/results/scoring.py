@@ -82,6 +82,7 @@ class Outcome:
     estimates: list[JudgedEstimate] = field(default_factory=list)
     shrinkage: float = math.nan  # closed over what the true effects would close
     seconds: float = math.nan  # per 30 s of test
+    signs: Mapping[str, float] = field(default_factory=dict)  # from which the probability follows
 
     @property
     def single(self) -> bool:
@@ -163,6 +164,7 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
         estimates=estimates(case, heard, names) if named else [],
         shrinkage=0.0 if math.isnan(closed) else closed / best,
         seconds=answer.seconds * STANDARD_LENGTH / float(case.plan["test"]["duration"]),
+        signs=next((one.signs for one in asked if one.names), {}),
     )
     return outcome if right else replace(outcome, why=why(outcome, answer.error))
 

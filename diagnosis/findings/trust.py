@@ -1,0 +1,64 @@
+"""How far a verdict that names effects may be trusted: its signs, and the probability learned from them.
+
+A verdict is right where it names every effect that is large enough to be found. What makes that more or less probable
+is summed up in a few signs; their weights were learned by `python -m validation.blind.learn` from verdicts on
+laboratories whose effects are known (ADR 0052).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.findings.found import Diagnosis
+from diagnosis.fits import worth
+from diagnosis.fits.unexplained import MATERIAL, remaining
+
+# Ends of the probability of the effects by the evidence alone, from which its log-odds are taken: beyond them a
+# difference of cost says nothing, since no draw was as sure and yet wrong.
+SUREST = 1e-3
+LEAST_TRACE = 0.1  # trace over noise below which a smaller one makes no difference: nothing can be seen of it
+SIGNS = ("odds", "trace", "left", "names")
+
+
+class Weights(NamedTuple):
+    """Log-odds that a verdict is right: a constant and what a unit of each sign adds."""
+
+    constant: float
+    signs: Mapping[str, float]
+
+    def probability(self, signs: Mapping[str, float]) -> float:
+        """The probability that a verdict with these signs is right."""
+        odds = self.constant + sum(weight * signs[name] for name, weight in self.signs.items())
+        return 1.0 / (1.0 + math.exp(-odds))
+
+
+def signs(found: Diagnosis) -> dict[str, float]:
+    """The signs of a diagnosis by name, empty where nothing is named.
+
+    odds: log-odds of the effects among the candidates, with the doubt about nominal parameters far off;
+    trace: log of the smallest trace of an effect named over noise;
+    left: log(1 + r/0.12) of the largest systematic residual over noise r that is left in any part;
+    names: how many effects are named beside the first.
+    """
+    named = [verdict for verdict in found.verdicts if verdict.effects]
+    count = sum(len(verdict.effects) for verdict in named) + len(found.readings) + len(found.link)
+    if not count:
+        return {}
+    likely = float(np.prod([verdict.probability for verdict in named]))
+    likely = min(max(likely, SUREST), 1.0 - SUREST)
+    traces = [
+        math.sqrt(float(np.max(size)) / verdict.search.data.group)
+        for verdict in named
+        for size in worth.changes(verdict.search.chosen)
+    ]
+    left = max((remaining(verdict.search.chosen) for verdict in found.verdicts), default=0.0)
+    return {
+        "odds": math.log(likely / (1.0 - likely)),
+        "trace": math.log(max(min(traces, default=1.0), LEAST_TRACE)),
+        "left": math.log1p(left / MATERIAL),
+        "names": count - 1.0,
+    }
