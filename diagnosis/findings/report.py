@@ -40,7 +40,8 @@ def build(
     found, learned, doubts = rest.judged(found, validation)
     status = status_of(found)
     shrunk = status != "explained" or how_far.shrinks(found, far.how_far)
-    named = which(found, 1.0 if shrunk else max(far.how_far.closed or 0.0, 0.0))
+    signs = trust.signs(found)
+    named = which(found, signs, 1.0 if shrunk else max(far.how_far.closed or 0.0, 0.0))
     tell("the next test", 0, 0)
     tests = next_test.choices(found)
     whole = Report(
@@ -56,7 +57,7 @@ def build(
         next_test=next_test.sentence(tests),
         warnings=(*found.warnings, *far.warnings, *named.warnings, *([] if shrunk else [OPEN]), *doubts),
         parts=parts_table.parts(found, require),
-        details=details.details(found, far, named.candidates, tests, trust.signs(found)),
+        details=details.details(found, far, named.candidates, tests, signs),
     )
     return Judged(whole, found)
 

@@ -17,11 +17,8 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import worth
 from diagnosis.fits.unexplained import MATERIAL, remaining
 
-# Ends of the probability of the effects by the evidence alone, from which its log-odds are taken: beyond them a
-# difference of cost says nothing, since no draw was as sure and yet wrong.
-SUREST = 1e-3
 LEAST_TRACE = 0.1  # trace over noise below which a smaller one makes no difference: nothing can be seen of it
-SIGNS = ("odds", "trace", "left", "names")
+SIGNS = ("clear", "names")
 
 
 class Weights(NamedTuple):
@@ -36,29 +33,26 @@ class Weights(NamedTuple):
         return 1.0 / (1.0 + math.exp(-odds))
 
 
+# Of verdicts that leave something ("partly"), from 24 of them (docs/reference/blind.md). Of those that leave nothing no
+# sign told the wrong ones: there the probability follows from costs alone (`verdict.DOUBT`).
+PARTLY = Weights(-0.61, {"clear": 0.47, "names": -0.71})
+
+
 def signs(found: Diagnosis) -> dict[str, float]:
     """The signs of a diagnosis by name, empty where nothing is named.
 
-    odds: log-odds of the effects among the candidates, with the doubt about nominal parameters far off;
-    trace: log of the smallest trace of an effect named over noise;
-    left: log(1 + r/0.12) of the largest systematic residual over noise r that is left in any part;
-    names: how many effects are named beside the first.
+    clear: log of the smallest trace of an effect named over the largest systematic residual left in any part, both over
+    noise; names: how many effects are named beside the first.
     """
     named = [verdict for verdict in found.verdicts if verdict.effects]
     count = sum(len(verdict.effects) for verdict in named) + len(found.readings) + len(found.link)
     if not count:
         return {}
-    likely = float(np.prod([verdict.probability for verdict in named]))
-    likely = min(max(likely, SUREST), 1.0 - SUREST)
     traces = [
         math.sqrt(float(np.max(size)) / verdict.search.data.group)
         for verdict in named
         for size in worth.changes(verdict.search.chosen)
     ]
     left = max((remaining(verdict.search.chosen) for verdict in found.verdicts), default=0.0)
-    return {
-        "odds": math.log(likely / (1.0 - likely)),
-        "trace": math.log(max(min(traces, default=1.0), LEAST_TRACE)),
-        "left": math.log1p(left / MATERIAL),
-        "names": count - 1.0,
-    }
+    trace = max(min(traces, default=1.0), LEAST_TRACE)
+    return {"clear": math.log(trace / (left + MATERIAL)), "names": count - 1.0}

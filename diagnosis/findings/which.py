@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from diagnosis.findings import trust
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import Interval, PartVerdict, intervals
 from diagnosis.fits.fitting import Fit
@@ -28,12 +29,18 @@ class Named(NamedTuple):
     warnings: tuple[str, ...]
 
 
-def which(found: Diagnosis, sure: float = 1.0) -> Named:
-    """The candidates, the verdict's with the probability `sure` at most, and warnings on the verdict's parameters."""
+def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Named:
+    """The candidates, the verdict's with the probability `sure` at most, and warnings on the verdict's parameters.
+
+    Where something is left, the probability follows from the `signs` of the verdict.
+    """
     named = [verdict for verdict in found.verdicts if verdict.effects]
     effects = [name for verdict in named for name in verdict.effects]
     effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
-    probability = min(sure, float(np.prod([verdict.probability for verdict in found.verdicts])))
+    likely = float(np.prod([verdict.probability for verdict in found.verdicts]))
+    if effects and any(verdict.outcome in ("partly", "unknown") for verdict in found.verdicts):
+        likely = trust.PARTLY.probability(signs)
+    probability = min(sure, likely)
     if not effects:
         probability = min(probability, nothing(found))
     fits = {name: values for verdict in named for name, values in intervals(verdict.fitted).items()}

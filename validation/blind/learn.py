@@ -30,7 +30,7 @@ from report.text import terminal
 from validation.blind.results.calibration import brier, expected_calibration_error
 
 # Whether a larger sign makes a verdict more (1) or less (-1) probable.
-SENSES = {"odds": 1.0, "trace": 1.0, "left": -1.0, "names": -1.0}
+SENSES = {"clear": 1.0, "names": -1.0}
 PENALTIES = (
     0.3,
     1.0,
