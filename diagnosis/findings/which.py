@@ -32,14 +32,14 @@ class Named(NamedTuple):
 def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Named:
     """The candidates, the verdict's with the probability `sure` at most, and warnings on the verdict's parameters.
 
-    Where something is left, the probability follows from the `signs` of the verdict.
+    Where something is left, what the `signs` of the verdict make of it is the most.
     """
     named = [verdict for verdict in found.verdicts if verdict.effects]
     effects = [name for verdict in named for name in verdict.effects]
     effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
     likely = float(np.prod([verdict.probability for verdict in found.verdicts]))
     if effects and any(verdict.outcome in ("partly", "unknown") for verdict in found.verdicts):
-        likely = trust.PARTLY.probability(signs)
+        likely = min(likely, trust.PARTLY.probability(signs))
     probability = min(sure, likely)
     if not effects:
         probability = min(probability, nothing(found))
