@@ -68,6 +68,7 @@ UNRUN = {
         "rths blind --set normal --seed 4103 --cases 80 --duration 12 -o runs/normal",
         "rths blind --set many --seed 4104 --cases 70 --duration 12 -o runs/many",
         "rths blind --set independent --seed 4105 --cases 90 --duration 12 -o runs/own",
+        "python -m validation.blind.learn runs/*/results.json",
         "rths blind --cases 240 --set judge --seed 2026 --jobs 2 -o runs/blind",
         "rths blind --cases 40 --set judge --seed 2026 --duration 20",
     ],
