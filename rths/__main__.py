@@ -6,7 +6,6 @@ import argparse
 import importlib
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 import common
@@ -193,6 +192,8 @@ def command(words: Sequence[str]) -> int:
         RthsError: the command cannot be run, or failed.
     """
     if words and words[0] == "--version":
+        from importlib.metadata import version
+
         sys.stdout.write(f"rths {version('rths')}\n")
         return 0
     if not words or words[0] in ("-h", "--help"):

@@ -11,18 +11,18 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from common.errors import InputError, RthsError
 from common.host import realtime
-from common.plan import read as plans
-from common.plan.plan import Plan
-from common.reality import reality as realities
-from common.reality.reality import Reality
 from common.reporting import Report
 from common.safety import risks
 from common.terminal.plain_report import PlainReport, plain, say
 from common.terminal.printable import escaping, shown
+
+if TYPE_CHECKING:  # plans and realities import numpy, which a query of the catalogue does without
+    from common.plan.plan import Plan
+    from common.reality.reality import Reality
 
 SHIPPED = (
     "benchmark2020",
@@ -189,6 +189,8 @@ def accepted_risks(args: argparse.Namespace) -> tuple[str, ...]:
 
 def load_plan(args: argparse.Namespace) -> Plan:
     """The plan of the command line with its options; raises PlanError."""
+    from common.plan import read as plans
+
     return plans.with_test(
         plans.load(plan_path(args.plan)),
         duration=args.duration,
@@ -207,6 +209,8 @@ def plan_path(name: str | None) -> Path:
 
 def load_reality(path: Path | None, plan: Plan) -> Reality:
     """The reality of the command line, as planned where there is none; raises PlanError."""
+    from common.reality import reality as realities
+
     return realities.load(path, plan) if path else realities.as_planned(plan)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,9 +12,11 @@ from common.errors import InputError
 from common.terminal.telling import Tell, untold
 from report.catalogue import entry, store
 from report.catalogue.columns import NAMES, notes_of
+from report.catalogue.entry import CatalogueEntry
+from simulation.workers.pool import spread
 
-# Threads that read at once: checksums and unpacking, two thirds of the work, run outside Python's lock.
-READERS = 4
+# Recordings from which on several processes read sooner than one: their start takes as long as some forty recordings.
+FEW = 40
 LARGEST_REPORT = (
     16 << 20
 )  # bytes of a JSON file that is looked into; a diagnosis report has some hundred thousand
@@ -46,13 +48,20 @@ def renew(folders: Sequence[Path], tell: Tell = untold) -> Renewal:
         anew = [name for name, value in stamps.items() if known.get(name) != value]
         gone = known.keys() - found.keys()
         forget(base, [*gone, *anew])
-        with ThreadPoolExecutor(READERS) as pool:
-            for done, one in enumerate(pool.map(lambda name: entry.entry(found[name], home), anew), 1):
-                add(base, one, stamps[one.facts["file"]])
-                tell("cataloguing", done, len(anew))
+        for one in entries([found[name] for name in anew], home, tell):
+            add(base, one, stamps[one.facts["file"]])
         judge(base, folders)
         count, lacking = base.execute("SELECT count(*), total(state != 'whole') FROM recordings").fetchone()
     return Renewal(count, len(anew), len(gone), int(lacking))
+
+
+def entries(paths: Sequence[Path], home: Path, tell: Tell) -> list[CatalogueEntry]:
+    """The entries of recordings in the order of their names, read by one process for each processor where many."""
+    read = []
+    for one in spread(partial(entry.entry, folder=home), paths, -1 if len(paths) > FEW else 1):
+        read.append(one)
+        tell("cataloguing", len(read), len(paths))
+    return sorted(read, key=lambda one: str(one.facts["file"]))
 
 
 def recordings(folder: Path) -> Iterator[Path]:
