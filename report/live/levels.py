@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.plan import Plan
-from common.plan.schema import as_type
 from common.recording.run import Values
 from common.roles import MASTER
 from common.signals import OF_STOREYS
-from report.facts.laboratories import SHIPPED, LaboratoryFacts
+from report.facts.laboratories import LaboratoryFacts
+from report.facts.limits import limits as known
 
 LATELY_S = (
     1.0  # s: two cycles of a building of 2 Hz, so that a bar stands still while a motion goes to and fro
@@ -69,25 +69,8 @@ def largest(sizes: Values) -> float:
 
 
 def limits(plan: Plan, lab: LaboratoryFacts) -> dict[str, float]:
-    """The limits of a laboratory's values that are recorded, and of the building's beside the master's, by name.
-
-    Of a kind of the user's own they are those that the plan gives: its class, which holds the others, is not run.
-    """
+    """The limits of a laboratory's values that are recorded, and of the building's beside the master's, by name."""
     names = [*OF_STOREYS] if lab.topic == MASTER and not plan.served else []
     names += [*lab.channels.names, *lab.channels.drives, *(one.name for one in lab.channels.driving)]
-    kind = SHIPPED.get(plan.kinds.get(lab.role, ""))
-    given = {name: float(value) for name, value in vars(plan.limits).items() if name in OF_STOREYS}
-    given |= kind.limits(plan.of(lab.role)) if kind else given_for_own(plan.of(lab.role), lab)
+    given = known(plan, lab)
     return {name: given[name] for name in dict.fromkeys(names) if math.isfinite(given.get(name, math.inf))}
-
-
-def given_for_own(part: Plan, lab: LaboratoryFacts) -> dict[str, float]:
-    """The limits in `[device.limits]` on signals of a laboratory of the user's kind, in the units of the signals."""
-    signals = (lab.channels.target, lab.channels.command, lab.channels.effort, *lab.channels.measured)
-    units = {signal.name: signal.unit for signal in signals if signal}
-    table = part.device.limits
-    return {
-        name: as_type("float", table[name], f"{name} in [device.limits]", units[name])
-        for name in units
-        if name in table
-    }

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from common.plan.plan import Plan
 from common.recording.run import Run
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, name_of, title
-from report.facts.laboratories import LaboratoryFacts, laboratories, whole_plan
+from report.facts.laboratories import laboratories, whole_plan
 from report.facts.late import said_beside_client
+from report.facts.limits import limits
 from report.text import holds
 from report.text.force_path import sentence as force_sentence
 from report.text.formats import apart, milliseconds, quantity
@@ -207,12 +207,6 @@ def margins(run: Run, summary: Summary) -> list[Margin]:
         if limit is not None and not of_all_slaves and math.isfinite(facts["peak"]):
             found.append(Margin(name, facts["peak"], limit, facts["unit"]))
     return sorted(found, key=lambda item: -item.share)
-
-
-def limits(plan: Plan, lab: LaboratoryFacts | None) -> Mapping[str, float]:
-    """The limits that the plan says by signal; of a kind of the user's those of `[device.limits]`."""
-    own: Mapping[str, Any] = lab.plan.device.limits if lab and lab.plan and lab.coupling is None else {}
-    return vars(plan.limits) | {name: value for name, value in own.items() if isinstance(value, int | float)}
 
 
 def nearest(run: Run, summary: Summary) -> str:

@@ -12,16 +12,18 @@ import pytest
 
 from common.host.clock import VirtualClock
 from common.plan.plan import Plan
-from common.plan.read import load
+from common.plan.read import load, parse
 from common.reality import reality
 from common.recording.reader import Tail
 from common.terminal.cli import plan_path
+from report.facts.laboratories import laboratory
 from report.live.feed import Feed
+from report.live.levels import limits
 from report.panel.desk import Desk, OrderOutcome, PageOrder, Present
 from report.panel.snapshot import CheckResult, RunReports, Shown, Snapshot
 from report.panel.view import PanelView
 from simulation import virtual
-from tests.helpers import with_table
+from tests.helpers import ROOT, with_table
 
 SECOND = 1_000_000_000
 
@@ -149,6 +151,17 @@ def test_bars_are_shown_relative_to_the_limits_of_the_plan(watched: Watched) -> 
     assert force["most"] == pytest.approx(top.most / 400e3)
     watched.to(1.0)
     assert {bar["age"] for bar in watched.state()["bars"]} == {None}
+
+
+def test_limits_of_a_kind_of_the_users_own_are_those_that_the_plan_gives_its_signals() -> None:
+    text = '[slave]\nkind = "viscous_damper.py:ViscousDamper"\n[device.limits]\npiston_force = "100 kN"\n'
+    plan = parse(text, ROOT / "examples")
+    units = {"command_seq": "", "piston_target": "m", "piston_command": "m", "piston_displacement": "m"}
+    lab = laboratory("slave", "slave", plan, units | {"piston_force": "N"})
+    assert lab is not None
+    assert limits(plan, lab) == {"piston_force": 100e3}
+    wrong = parse(text.replace("100 kN", "100 mm"), ROOT / "examples")
+    assert limits(wrong, lab) == {}
 
 
 def test_the_largest_value_of_the_last_second_follows_a_decaying_motion(watched: Watched) -> None:
