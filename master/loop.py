@@ -197,8 +197,7 @@ class MasterLoop(RigLoop):
             return None
         if self._building.over:
             self.stop(COMPLETED)
-            return None
-        return outputs
+        return outputs if self.lab.running else None
 
     def _settle(self, tick: int) -> None:
         """Let the building use the time after the commands; if it fails, the ramp begins at the next tick."""

@@ -14,6 +14,7 @@ from common.recording.reader import read
 
 HERE = Path(__file__).parent
 HOW = ("killed", "stalled", "malformed", "diverged")  # of benchmarks/opensees/failing.py
+SECOND = "second"  # of the same file: a client that comes second
 STEPS = 200
 MOST_MS = 10.0  # five intervals of 2 ms: `ramp_after` beside a rig
 RIG = '''
@@ -62,11 +63,22 @@ def run(
                 found.append(
                     first_of_the_ramp(json.loads(log.read_text()), ramp, int(json.loads(line)["last_ns"]))
                 )
-        title = f"rths serve, a client that is {how}, to the first command of the ramp to rest"
-        if found:
-            yield cost_figure(title, "ms", found, most=MOST_MS)
-        else:
-            yield BenchmarkFigure(f"{title}: all tests ended before", "ms", None, None)
+        yield figure(f"rths serve, a client that is {how}, to the first command of the ramp to rest", found)
+    closed: list[float] = []
+    for _ in range(repeats):
+        with serve(rig) as port:
+            line = said(command(port, SECOND), priority)
+        first = read(folder / "served.mcap").columns["master"]["client_step"]
+        if line and first.max() >= 2 * STEPS:  # the first client had all its displacements
+            closed.append(float(json.loads(line)["closed_ms"]))
+    yield figure("rths serve, a second client beside one that goes on, to its refusal", closed)
+
+
+def figure(title: str, found: list[float]) -> BenchmarkFigure:
+    """The figure of some times (ms), where there are any."""
+    if found:
+        return cost_figure(title, "ms", found, most=MOST_MS)
+    return BenchmarkFigure(f"{title}: all tests ended before", "ms", None, None)
 
 
 def command(port: int, how: str) -> list[str]:

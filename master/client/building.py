@@ -51,7 +51,7 @@ class ClientBuilding(BuildingStep):
         self._ramp = self._intervals - int(self._intervals > 1 and bool(plan.roles))
         self._compensator = compensator(plan)
         self._interval, self._pace = interval, pace
-        self._watchdog = Watchdog(plan.safety, interval)
+        self._watchdog, self._finding = Watchdog(plan.safety, interval), WatchdogFinding.FINE
         self._report = report
         self._early: list[str] = []  # warnings before the start, when the time of the test is not known
         self._lab: Laboratory | None = None
@@ -112,11 +112,26 @@ class ClientBuilding(BuildingStep):
             self._fetch(tick)
         waited = not (self._moving or self._over)
         self._late = waited and self._pace.fair(self._lab, tick, self._handed_ns)
+        self._judge(tick, self._lab)
         if not self._moving:
             self._outputs = self._outputs._replace(target=self._own.target if self._own else 0.0, held=True)
             return self._outputs
-        self._heard = tick
         return self._move(position)
+
+    def _judge(self, tick: int, lab: Laboratory) -> None:
+        """Count a tick without a displacement; in the last that the plan allows the ramp to rest begins at once.
+
+        The watchdog looks when the wait for the client is over, so that the ramp begins within `ramp_after` intervals
+        of the forces that the client has not answered. In virtual time the pace alone ends the wait.
+        """
+        if self._moving:
+            self._heard = tick
+        may_have_come = self._lateness >= self._interval  # while this loop was held up
+        if not self._pace.settles or self._heard < 0 or self._over or may_have_come:
+            return
+        self._finding = self._watchdog.look(tick, self._heard, self._heard)
+        if self._finding is WatchdogFinding.RAMP:
+            lab.silent(self.who, tick)
 
     def _record_early(self, lab: Laboratory) -> None:
         at = lab.unix_ns(0)
@@ -234,10 +249,8 @@ class ClientBuilding(BuildingStep):
         return self._over
 
     def look(self, tick: int) -> WatchdogFinding:
-        """The watchdog's finding on the client's displacements; none in virtual time or before the first one."""
-        if not self._pace.settles or self._heard < 0:
-            return WatchdogFinding.FINE
-        return self._watchdog.look(tick - 1, self._heard, self._heard)
+        """The watchdog's finding when the tick before had waited for the client; fine in virtual time."""
+        return self._finding
 
     def recorded(self, outputs: Outputs) -> tuple[Sequence[float], Sequence[float]]:
         """The client's step and time, its displacements, the forces returned, and its waiting time and lateness."""
