@@ -16,6 +16,7 @@ from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.residuals import Data
+from laboratories.effects.effect import Parameter
 from models.registry import Array
 from simulation.campaign.information import odds
 
@@ -173,10 +174,19 @@ def sized(place: int, fit: Fit) -> Iterator[HiddenCause]:
         shapes = {item.name: item.default for item in effect.parameters if item.default is not None}
         for level in (0.0, 0.5, 1.0):
             values = {
-                item.name: item.sizes[round(level * (len(item.sizes) - 1))] for item in strength if item.sizes
+                item.name: by_strength(item)[round(level * (len(item.sizes) - 1))]
+                for item in strength
+                if item.sizes
             }
             if len(values) == len(strength):
                 yield HiddenCause(place, {effect.name: {**shapes, **values}})
+
+
+def by_strength(item: Parameter) -> list[float]:
+    """The sizes of a parameter, the weakest first; the catalogue lists those on both sides of a null value by value."""
+    if not np.isfinite(item.null):
+        return list(item.sizes)
+    return sorted(item.sizes, key=lambda size: abs(size - item.null))
 
 
 class Sight(NamedTuple):
