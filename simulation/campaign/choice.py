@@ -21,6 +21,9 @@ AS_MUCH = 0.01
 # Bits below which no test tells anything: it would change a probability of 95 % by less than one point.
 LEAST = 0.01
 
+# Statuses of a diagnosis that leaves a gap without a cause.
+LEAVING = ("partly_explained", "unknown_effect")
+
 FROM_THE_LEAST = (
     "It has the smallest drift, from which the drift may grow by the factor that the limits allow."
 )
@@ -114,10 +117,21 @@ def following(pick: Pick, steps: Sequence[Step], last: DiagnosedStep) -> Decided
         return EndedStep(
             SILENT,
             "No test within these limits tells more about the cause than is known; the most probable one is "
-            f"{likely(last)}.",
+            f"{likely(last)}.{without_cause(last)}",
         )
     chosen = pick(left, last.test + 1)
     return DecidedStep(last.test + 1, chosen.candidate, chosen.bits, reason(chosen, left))
+
+
+def without_cause(last: DiagnosedStep) -> str:
+    """Why no further test helps where a diagnosis leaves a gap without a cause; empty where it leaves none."""
+    if not any(one in last.status for one in LEAVING):
+        return ""
+    return (
+        f" The diagnosis leaves a gap, of up to {percent(last.gap)}, for which its catalogue has no cause. What a test "
+        "would show of such a cause cannot be predicted, so that no test is chosen for it: give an effect of your own, "
+        "or play a test of your choice."
+    )
 
 
 def none_left(options: Sequence[Option]) -> EndedStep:

@@ -96,6 +96,12 @@ def test_the_same_seed_draws_the_same_random_tests() -> None:
         (HEAD, {"test": 4}, "tests", "All 4 tests are played; the most probable cause is a, with 60 %."),
         (HEAD, {"options": OPTIONS[3:]}, "limits", "within the limits: the drift would pass 0.01 m."),
         (HEAD, {"options": (Option(1, 0.0, 0.0, "", 0.009, 0.6),)}, "silent", "tells more about the cause"),
+        (
+            HEAD,
+            {"options": (Option(1, 0.0, 0.0, "", 0.0, 0.6),), "status": "partly_explained"},
+            "silent",
+            "The diagnosis leaves a gap, of up to 10 %, for which its catalogue has no cause.",
+        ),
     ],
 )
 def test_the_reason_for_the_end_of_a_campaign_is_named(
