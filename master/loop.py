@@ -190,6 +190,7 @@ class MasterLoop(RigLoop):
 
     def _computed(self, tick: int, measured: tuple[float, ...], forces: Sequence[float]) -> Outputs | None:
         """What the building gives, None where it has ended the test."""
+        running = self.lab.running
         try:
             outputs = self._building(tick, *self._own.felt(measured), forces)
         except (InterlockError, LostError) as error:
@@ -197,7 +198,7 @@ class MasterLoop(RigLoop):
             return None
         if self._building.over:
             self.stop(COMPLETED)
-        return outputs if self.lab.running else None
+        return None if running and not self.lab.running else outputs
 
     def _settle(self, tick: int) -> None:
         """Let the building use the time after the commands; if it fails, the ramp begins at the next tick."""
