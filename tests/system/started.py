@@ -97,10 +97,16 @@ def gone(number: int) -> bool:
 def wait_for_ticks(path: Path, ticks: int = 200, seconds: float = HANG_S) -> None:
     """Until a recording that is being written holds some ticks."""
     deadline = time.monotonic() + seconds
+    seen = "no file"
     while time.monotonic() < deadline:
         if path.exists() and path.stat().st_size > 10_000:
-            with contextlib.suppress(Exception):  # a chunk that is being written
-                if read(path).ticks("master") >= ticks:
-                    return
+            try:
+                found = read(path).ticks("master")
+                seen = f"{found} ticks in {path.stat().st_size} bytes"
+            except Exception as error:  # a chunk that is being written
+                found, seen = 0, repr(error)
+            if found >= ticks:
+                return
         time.sleep(0.1)
-    raise AssertionError(f"no {ticks} ticks in {path} after {seconds} s")
+    others = [path.name for path in path.parent.iterdir()]
+    raise AssertionError(f"no {ticks} ticks in {path} after {seconds} s: {seen}; in its folder {others}")
