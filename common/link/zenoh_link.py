@@ -225,6 +225,14 @@ class ZenohLink:
 
         self._session.info.declare_link_events_listener(joined, history=True)
 
+    @property
+    def connected(self) -> bool:
+        """Whether the master is connected to this end, which dialled it.
+
+        A master that is silent for `LEASE_MS` is not connected any more. zenoh dials it again until it answers.
+        """
+        return bool(self._session.info.routers_zid())
+
     def listen(self, heard: Callable[[Packet], None]) -> None:
         """Call `heard` with every frame from now on, in the thread of zenoh's that receives it."""
         self._subscribers += [

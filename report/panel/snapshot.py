@@ -40,8 +40,9 @@ class Shown(NamedTuple):
     digest: str
     recording: Path | None
     own: bool  # whether this panel has started it
-    reached: bool  # whether the operator's link to it is open
+    linked: bool  # whether its master is connected to the panel
     told: RunReports = RunReports()
+    unlinked_at: int = 0  # when that connection was lost, 0 where it was not
     since_ns: int = 0  # Unix time of its begin: a recording that was written before is another test's
 
 

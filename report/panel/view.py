@@ -43,7 +43,7 @@ class PanelView:
         return {
             "seen": self._clock.now() // 1_000_000,
             "page": self._desk.page(session),
-            "test": test(shown, feed) if shown else None,
+            "test": self._test(shown, feed) if shown else None,
             "phase": phase(snapshot, labs, feed),
             "labs": labs,
             "causes": causes(snapshot, feed),
@@ -57,6 +57,20 @@ class PanelView:
     def _seconds(self, at: int) -> float:
         """The age of what was at a time (ns), s."""
         return max(self._clock.now() - at, 0) * 1e-9
+
+    def _test(self, shown: Shown, feed: Feed) -> dict[str, Any]:
+        """The test that runs."""
+        return {
+            "id": shown.test,
+            "name": shown.name,
+            "digest": shown.digest,
+            "recording": str(shown.recording or ""),
+            "own": shown.own,
+            "linked": shown.linked,
+            "unlinked": self._seconds(shown.unlinked_at) if shown.unlinked_at else None,
+            "t": feed.t,
+            "duration": shown.plan.test.duration,
+        }
 
     def _lab(self, role: str, shown: Shown, feed: Feed) -> dict[str, Any]:
         """The mode of a laboratory, by the newest that is known of it."""
@@ -136,20 +150,6 @@ class PanelView:
             "text": outcome.text,
             "age": self._seconds(entry.at),
         }
-
-
-def test(shown: Shown, feed: Feed) -> dict[str, Any]:
-    """The test that runs."""
-    return {
-        "id": shown.test,
-        "name": shown.name,
-        "digest": shown.digest,
-        "recording": str(shown.recording or ""),
-        "own": shown.own,
-        "reached": shown.reached,
-        "t": feed.t,
-        "duration": shown.plan.test.duration,
-    }
 
 
 def phase(snapshot: Snapshot, labs: list[dict[str, Any]], feed: Feed) -> str:

@@ -19,7 +19,6 @@ from common.errors import RthsError
 from common.host import running
 from common.host.running import Running
 from common.lab.operation import EMERGENCY, STOP
-from common.link.endpoint import Endpoint
 from common.plan.plan import Plan
 from common.plan.read import parse
 from common.roles import title
@@ -27,13 +26,14 @@ from report.panel.desk import DONE, REFUSED, UNHEARD, OrderOutcome, Present
 from report.panel.snapshot import CheckResult, RunReports, Shown, Snapshot
 from report.panel.words import ARM, CHECK, MACHINE
 from rths.panel.child import Check, RunCommand
-from rths.perform.operate import PATIENCE_S, Given, Outstanding, line
+from rths.perform.operate import PATIENCE_S, Given, OperatorLink, Outstanding, operator_link
 
 TURN_S = 0.01  # s between two turns while answers are awaited
 IDLE_S = 0.05  # s between two turns while none is; a new order ends the wait at once
 LOOK_S = 0.3  # s between two looks for tests on this machine
 STOPS = (STOP, EMERGENCY)
 BUSY = "A test runs, which a check would disturb."
+INTERRUPTED = "The test's command ends it in order, as by Ctrl-C: its laboratories are not linked."
 OVER = OrderOutcome(UNHEARD, "This part of the panel has ended: start `rths panel` again.")
 
 
@@ -45,6 +45,7 @@ class Job(NamedTuple):
     reason: str
     settled: Future[OrderOutcome]
     until: float  # s, when it is given up for want of a link
+    interrupted: bool = False  # whether the test's command was asked to end the test too
 
 
 class Options(NamedTuple):
@@ -57,37 +58,46 @@ class Options(NamedTuple):
     doctor: Sequence[str]  # options of `rths doctor`
 
 
-class Reached:
-    """A test on this machine, and the operator's link to it once that is open."""
+class RunningTest:
+    """A test on this machine, and the operator's link to it once that is open.
+
+    zenoh keeps the open link: it dials the master again after an interruption, so that the same link carries orders
+    then. `linked` says whether it does at present.
+    """
 
     def __init__(self, process: int, entry: Running, opener: ThreadPoolExecutor) -> None:
         self.entry = entry
         self.plan = parse(entry.plan, Path(entry.folder))
         self.digest = self.plan.digest()
-        self.test = named(entry.test, process)
+        self.name = named(entry.test, process)
         self.orders: Outstanding | None = None
-        self._endpoint: Endpoint | None = None
+        self.linked = False  # whether the master is connected to the link
+        self.unlinked_at = 0  # when it ceased to be connected, own clock, ns; 0 where it did not
+        self._link: OperatorLink | None = None
         self._opener = opener
-        self._opening: Future[Endpoint] | None = None
+        self._opening: Future[OperatorLink] | None = None
 
-    def open(self) -> None:
-        """Open the link, attempt after attempt."""
-        if self.orders is not None:
-            return
-        if self._opening is None:
-            self._opening = self._opener.submit(line, self.plan, self.entry.endpoint)
+    def follow(self) -> None:
+        """Open the link, attempt after attempt, and then see whether the master is connected."""
+        if self._link is not None:
+            linked = self._link.connected()
+            if linked != self.linked:
+                self.linked, self.unlinked_at = linked, 0 if linked else time.monotonic_ns()
+        elif self._opening is None:
+            self._opening = self._opener.submit(operator_link, self.plan, self.entry.endpoint)
         elif self._opening.done():
             opening, self._opening = self._opening, None
             with contextlib.suppress(RthsError):  # the master does not listen yet
-                self._endpoint = opening.result()
-                self.orders = Outstanding(self._endpoint, self.plan)
+                self._link = opening.result()
+                self.orders = Outstanding(self._link.endpoint, self.plan)
+                self.linked = True
 
     def close(self) -> None:
         """Close the link."""
         if self._opening is not None:
             self._opening.add_done_callback(closed)
-        if self._endpoint is not None:
-            self._endpoint.close()
+        if self._link is not None:
+            self._link.endpoint.close()
 
 
 class PanelExecutor:
@@ -98,7 +108,7 @@ class PanelExecutor:
         self._queue: Queue[Job] = Queue()
         self._waiting: list[Job] = []  # for a link
         self._given: dict[int, Job] = {}  # by press
-        self._reached: Reached | None = None
+        self._test: RunningTest | None = None
         self._command: RunCommand | None = None
         self._armed: Plan | None = None  # the plan with which the command was started
         self._digest = ""  # of that plan
@@ -169,8 +179,8 @@ class PanelExecutor:
             job.settled.set_result(OVER)
         for check, _ in self._checks.values():
             check.end()
-        if self._reached is not None:
-            self._reached.close()
+        if self._test is not None:
+            self._test.close()
 
     def _turn(self) -> None:
         with contextlib.suppress(Empty):
@@ -187,7 +197,7 @@ class PanelExecutor:
 
     @property
     def _linked(self) -> bool:
-        return self._reached is not None and self._reached.orders is not None
+        return self._test is not None and self._test.linked
 
     def _begin(self, job: Job) -> None:
         match job.word:
@@ -197,17 +207,17 @@ class PanelExecutor:
                 self._arm(job)
             case _ if job.word in STOPS and not self._linked and self._command is not None:
                 self._command.interrupt()
-                text = (
-                    "The test's command ends it in order, as by Ctrl-C: its laboratories are not linked yet."
-                )
-                job.settled.set_result(OrderOutcome(DONE, text))
+                if self._test is not None and self._test.orders is not None:
+                    self._waiting.append(job._replace(interrupted=True))  # the link may come back in time
+                else:
+                    job.settled.set_result(OrderOutcome(DONE, INTERRUPTED))
             case _:
                 self._waiting.append(job)
 
     # -- checks -----------------------------------------------------------------------------------
 
     def _check(self, job: Job) -> None:
-        if self._command is not None or self._reached is not None:
+        if self._command is not None or self._test is not None:
             job.settled.set_result(OrderOutcome(REFUSED, BUSY))
             return
         if self._checks:
@@ -242,7 +252,7 @@ class PanelExecutor:
 
     def _not_to_arm(self, job: Job) -> str:
         """Why no test is armed, empty where one is."""
-        if self._command is not None or self._reached is not None:
+        if self._command is not None or self._test is not None:
             return "A test runs already."
         if self._checks:
             return "A check is under way."
@@ -283,17 +293,17 @@ class PanelExecutor:
         own = self._command.process if self._command else 0
         process = own if own in found else next(reversed(found), 0) if not own else 0
         entry = found.get(process)
-        if self._reached is not None and (entry is None or named(entry.test, process) != self._reached.test):
-            self._reached.close()
-            self._reached = None
-        if entry is not None and self._reached is None:
+        if self._test is not None and (entry is None or named(entry.test, process) != self._test.name):
+            self._test.close()
+            self._test = None
+        if entry is not None and self._test is None:
             with contextlib.suppress(RthsError):  # its plan needs what is not there any more
-                self._reached = Reached(process, entry, self._opener)
-                self._same_plan(self._reached)
+                self._test = RunningTest(process, entry, self._opener)
+                self._same_plan(self._test)
 
-    def _same_plan(self, reached: Reached) -> None:
+    def _same_plan(self, test: RunningTest) -> None:
         """End a test of the panel's own whose plan is not the one that was checked and shown."""
-        if self._command is None or self._armed is None or reached.digest == self._digest:
+        if self._command is None or self._armed is None or test.digest == self._digest:
             return
         self._command.interrupt()
         if self._arming is not None:
@@ -303,9 +313,9 @@ class PanelExecutor:
 
     def _exchange(self) -> None:
         """Send orders and take the answers to them."""
-        if self._reached is not None:
-            self._reached.open()
-        orders = self._reached.orders if self._reached else None
+        if self._test is not None:
+            self._test.follow()
+        orders = self._test.orders if self._test else None
         for job in list(self._waiting):
             if orders is not None:
                 self._waiting.remove(job)
@@ -315,7 +325,11 @@ class PanelExecutor:
                 job.settled.set_result(OrderOutcome(UNHEARD, "There is no link to the laboratories."))
         if orders is not None:
             for given in orders.look(TURN_S if self._given else 0.0):
-                self._given.pop(given.wish.press).settled.set_result(outcome(given))
+                job = self._given.pop(given.wish.press)
+                found = outcome(given)
+                if job.interrupted and found.state == UNHEARD:
+                    found = OrderOutcome(UNHEARD, f"{found.text} {INTERRUPTED}")
+                job.settled.set_result(found)
         elif self._given:
             for job in self._given.values():
                 job.settled.set_result(
@@ -325,32 +339,34 @@ class PanelExecutor:
 
     def _present_test(self) -> Shown | None:
         """The test that the pages show."""
-        command, reached = self._command, self._reached
-        if reached is not None:
-            entry = reached.entry
-            own = command is not None and named(entry.test, command.process) == reached.test
+        command, test = self._command, self._test
+        if test is not None:
+            entry = test.entry
+            own = command is not None and named(entry.test, command.process) == test.name
             return Shown(
-                test=reached.test,
+                test=test.name,
                 name=entry.test,
-                plan=reached.plan,
-                digest=reached.digest,
+                plan=test.plan,
+                digest=test.digest,
                 recording=Path(entry.recording) if entry.recording else None,
                 own=own,
-                reached=reached.orders is not None,
+                linked=test.linked,
+                unlinked_at=test.unlinked_at,
                 told=command.told if own and command is not None else RunReports(),
                 since_ns=round(entry.since * 1e9),
             )
         if command is None or self._armed is None:
             return None
         name = self._armed.test.name
-        test = named(name, command.process)
-        return Shown(test, name, self._armed, self._digest, None, True, False, command.told)
+        return Shown(
+            named(name, command.process), name, self._armed, self._digest, None, True, False, command.told
+        )
 
 
-def closed(opening: Future[Endpoint]) -> None:
+def closed(opening: Future[OperatorLink]) -> None:
     """Close a link that was opened too late to be used."""
     if opening.exception() is None:
-        opening.result().close()
+        opening.result().endpoint.close()
 
 
 def named(test: str, process: int) -> str:

@@ -4,7 +4,7 @@ The orders are those of `common.lab.operation.ORDERS`. To send one:
 
 1. `chosen` gives the plan of the test and the endpoint of its master, on the machine of `rths run` from the account
    that the test keeps there;
-2. `line` opens the link to that endpoint as the operator. It may be kept for many orders, and is closed by `close`;
+2. `operator_link` opens the link to that endpoint. It may be kept for many orders; `endpoint.close` closes it;
 3. `gathered` sends one order and returns an `Answer` by role, with `accepted` and a sentence in `text`. A role that is
    missing in the result was not heard.
 
@@ -21,9 +21,10 @@ import json
 import secrets
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from common.errors import LostError
 from common.host import running
@@ -81,14 +82,21 @@ def chosen(args: argparse.Namespace) -> tuple[Plan, str]:
 
 def asked(plan: Plan, connect: str, word: str, reason: str) -> dict[str, Answer]:
     """The answers by role to one order, over a link of its own."""
-    endpoint = line(plan, connect)
+    link = operator_link(plan, connect)
     try:
-        return gathered(endpoint, plan, word, reason)
+        return gathered(link.endpoint, plan, word, reason)
     finally:
-        endpoint.close()
+        link.endpoint.close()
 
 
-def line(plan: Plan, connect: str) -> Endpoint:
+class OperatorLink(NamedTuple):
+    """The operator's link to a test: its messages, and whether the master is connected to it at present."""
+
+    endpoint: Endpoint
+    connected: Callable[[], bool]
+
+
+def operator_link(plan: Plan, connect: str) -> OperatorLink:
     """The operator's link to the master that listens at `connect`.
 
     Raises:
@@ -98,7 +106,8 @@ def line(plan: Plan, connect: str) -> Endpoint:
     from common.link.endpoint import FrameEndpoint
 
     impatient = replace(plan, link=replace(plan.link, connect_timeout=PATIENCE_S))
-    return FrameEndpoint(join(impatient, OPERATOR, str, cli.text_report, connect=connect), plan.digest())
+    link = join(impatient, OPERATOR, str, cli.text_report, connect=connect)
+    return OperatorLink(FrameEndpoint(link, plan.digest()), lambda: link.connected)
 
 
 def new_press() -> int:

@@ -1,8 +1,13 @@
-"""Stand-ins for the laboratories of a test, which answer an operator over zenoh as they do, and count the presses."""
+"""Stand-ins for the laboratories of a test, which answer an operator over zenoh as they do, and count the presses.
+
+`python -m tests.rths.panel.stand_in PLAN` keeps them in a process of its own, until that is ended.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import signal
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +17,7 @@ from common.lab.operation import ORDERS
 from common.link.endpoint import FrameEndpoint
 from common.link.zenoh_link import ZenohLink, listenable
 from common.plan.plan import Plan
+from common.plan.read import load
 from common.protocol.messages import Answer, Operator
 from common.roles import MASTER
 
@@ -66,3 +72,8 @@ class StandIn:
                 self._ending.set()
                 for thread in self._threads:
                     thread.join()
+
+
+if __name__ == "__main__":
+    with StandIn(load(Path(sys.argv[1]))).there():
+        signal.pause()

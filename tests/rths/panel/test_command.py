@@ -46,7 +46,8 @@ class Served:
     urls: list[str]
 
     def __init__(self, feed: object, port: int, rate: float, *, host: str, panel: Any) -> None:
-        assert (feed, rate) == (None, panel and 10.0)
+        assert feed is None
+        assert 1.0 < rate <= 10.0
         self.url = panel(port or 5006).guard.url
         Served.urls = [host, self.url]
 

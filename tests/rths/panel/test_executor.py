@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 import time
@@ -17,7 +18,7 @@ from common.plan.read import with_test
 from report.panel.desk import OrderOutcome, Present
 from rths.panel.executor import Options, PanelExecutor
 from rths.perform import operate
-from tests.processes import HANG_S
+from tests.processes import HANG_S, environment, tied
 from tests.rths.panel.stand_in import StandIn
 
 RUN = """
@@ -112,7 +113,7 @@ def test_lost_frames_are_repeated_and_no_order_waits_for_the_answers_to_another(
     labs = StandIn(desk.plan)
     labs.lossy = 3
     with labs.there():
-        until(lambda: desk.executor.snapshot.shown and desk.executor.snapshot.shown.reached)
+        until(lambda: desk.executor.snapshot.shown and desk.executor.snapshot.shown.linked)
         given = [desk.executor.carry_out("stop", "", "") for _ in range(60)]
         assert {one.result(HANG_S).state for one in given} == {"done"}
         for role in ("master", "slave"):
@@ -132,9 +133,39 @@ def test_every_order_gets_an_outcome_when_the_test_ends(desk: Desk) -> None:
     labs = StandIn(desk.plan)
     labs.deaf = {"master", "slave"}
     with labs.there():
-        until(lambda: desk.executor.snapshot.shown and desk.executor.snapshot.shown.reached)
+        until(lambda: desk.executor.snapshot.shown and desk.executor.snapshot.shown.linked)
         given = desk.executor.carry_out("stop", "", "")
     assert given.result(HANG_S).state == "not heard"
+
+
+def test_a_stopped_master_is_shown_as_not_linked_until_it_answers_again(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "plan.toml").write_text(desk.plan.toml())
+    words = tied(sys.executable, "-m", "tests.rths.panel.stand_in", tmp_path / "plan.toml")
+    with subprocess.Popen(words, env=environment()) as labs:
+
+        def linked() -> bool:
+            shown = desk.executor.snapshot.shown
+            return shown is not None and shown.linked
+
+        monkeypatch.setattr(operate, "PATIENCE_S", HANG_S)
+        until(linked)
+        assert desk.give("stop").state == "done"
+        labs.send_signal(signal.SIGSTOP)
+        until(lambda: not linked())
+        shown = desk.executor.snapshot.shown
+        assert shown is not None
+        assert 0 < shown.unlinked_at <= time.monotonic_ns()
+        monkeypatch.setattr(operate, "PATIENCE_S", 0.3)
+        assert desk.give("stop").text.startswith("No answer came from the master and the slave within")
+        monkeypatch.setattr(operate, "PATIENCE_S", HANG_S)
+        labs.send_signal(signal.SIGCONT)
+        until(linked)
+        assert desk.executor.snapshot.shown == shown._replace(linked=True, unlinked_at=0)
+        assert desk.give("stop").state == "done"
+        labs.kill()
+    until(lambda: desk.executor.snapshot.shown is None)
 
 
 def test_arming_starts_a_run_command_and_reports_when_all_laboratories_are_armed(

@@ -55,7 +55,7 @@ def test_a_recording_of_an_earlier_test_is_never_shown_as_the_present_one(
     panel = followed.panel
     panel.look()
     assert not panel.feed.changes
-    shown = Shown("b-2", "b", short_plan, "", path, own=False, reached=True)
+    shown = Shown("b-2", "b", short_plan, "", path, own=False, linked=True)
     followed.shown = shown._replace(since_ns=BEGUN_S * 1_000_000_000)
     panel.look()
     assert not panel.feed.changes

@@ -50,7 +50,7 @@ class Watched:
         self.desk = Desk(Idle(), self.clock)
         self.page = self.desk.enter()
         self.view = PanelView(self.desk, self.clock)
-        self.shown: Shown | None = Shown("a-1", "a", plan, plan.digest(), path, own=True, reached=True)
+        self.shown: Shown | None = Shown("a-1", "a", plan, plan.digest(), path, own=True, linked=True)
 
     def to(self, share: float) -> None:
         """Let the recording grow to this share of its length."""
