@@ -28,7 +28,7 @@ class RunReports(NamedTuple):
     alive: tuple[str, ...] = ()  # the processes that ran
     alive_at: int = 0
     causes: tuple[tuple[str, str], ...] = ()  # laboratory and sentence, the first first
-    said: tuple[str, ...] = ()  # other lines, the newest last
+    lines: tuple[str, ...] = ()  # other lines, the newest last
 
 
 class Shown(NamedTuple):
@@ -41,7 +41,7 @@ class Shown(NamedTuple):
     recording: Path | None
     own: bool  # whether this panel has started it
     linked: bool  # whether its master is connected to the panel
-    told: RunReports = RunReports()
+    reports: RunReports = RunReports()
     unlinked_at: int = 0  # when that connection was lost, 0 where it was not
     since_ns: int = 0  # Unix time of its begin: a recording that was written before is another test's
 

@@ -50,7 +50,7 @@ class PanelView:
             "bars": list(bars(feed)),
             "plan": self._plan(snapshot),
             "machine": self._machine(snapshot.machine),
-            "said": list(shown.told.said if shown else ()),
+            "lines": list(shown.reports.lines if shown else ()),
             "orders": [self._order(entry, session) for entry in self._desk.newest],
         }
 
@@ -74,34 +74,34 @@ class PanelView:
 
     def _lab(self, role: str, shown: Shown, feed: Feed) -> dict[str, Any]:
         """The mode of a laboratory, by the newest that is known of it."""
-        told = shown.told
+        reports = shown.reports
         measured = feed.standing.age(role) if feed.standing.last(role) is not None else None
         mode, age, note = feed.standing.modes.get(role, UNKNOWN), measured, ""
-        if role in told.modes:
-            mode, at = told.modes[role]
+        if role in reports.modes:
+            mode, at = reports.modes[role]
             still = mode not in MOVING
             age = (
-                self._seconds(told.alive_at)
+                self._seconds(reports.alive_at)
                 if still
                 else measured
                 if measured is not None
                 else self._seconds(at)
             )
-            if role not in told.alive and told.alive_at > at:
+            if role not in reports.alive and reports.alive_at > at:
                 in_order = mode == Mode.IDLE.value  # as after every end in which its rig came to rest
                 mode, note = LEFT if in_order else GONE, f"it was {mode.replace('_', ' ')}"
-                age = self._seconds(told.alive_at)
+                age = self._seconds(reports.alive_at)
         elif shown.own:
-            mode, age = "starting", self._seconds(told.alive_at) if role in told.alive else None
+            mode, age = "starting", self._seconds(reports.alive_at) if role in reports.alive else None
         if mode in {one.value for one in LATCHED}:
             note = "latched until Reset"
-        said = mode.replace("_", " ")
+        words = mode.replace("_", " ")
         loud = "bad" if mode == GONE else LOUD.get(mode, "")
-        return {"role": role, "title": title(role), "mode": said, "loud": loud, "age": age, "note": note}
+        return {"role": role, "title": title(role), "mode": words, "loud": loud, "age": age, "note": note}
 
     def _plan(self, snapshot: Snapshot) -> dict[str, Any]:
         """The plan that can be armed, as `rths check` describes it."""
-        looked, found = snapshot.plan, snapshot.plan.found
+        checked, found = snapshot.plan, snapshot.plan.found
         (_, text), *others = plan_text.named(found) if found else [("", "")]
         peaks = [
             {
@@ -120,24 +120,24 @@ class PanelView:
             "facts": [("test", text), *others] if found else [],
             "peaks": peaks,
             "concerns": list(plan_text.concerns(found)) if found else [],
-            **self._looked(looked),
+            **self._checked(checked),
         }
 
-    def _machine(self, looked: CheckResult) -> dict[str, Any]:
+    def _machine(self, checked: CheckResult) -> dict[str, Any]:
         """What this machine lacks, as `rths doctor` says it."""
-        found = looked.found
+        found = checked.found
         failed: dict[str, list[str]] = {}
         for one in found.get("checks", ()):
             if not one["passed"]:
                 failed.setdefault(one["advice"], []).append(one["name"])
         lacks = [f"{', '.join(names)}: {advice}" for advice, names in failed.items()]
         lacks += [*found["realtime"]["missing"], *found["notes"]] if found else []
-        said = found["verdict"]["sentence"] if found else ""
-        return {"lacks": lacks, "verdict": said, **self._looked(looked)}
+        verdict = found["verdict"]["sentence"] if found else ""
+        return {"lacks": lacks, "verdict": verdict, **self._checked(checked)}
 
-    def _looked(self, looked: CheckResult) -> dict[str, Any]:
-        age = self._seconds(looked.at) if looked.at else None
-        return {"busy": looked.busy, "complaint": looked.complaint, "age": age}
+    def _checked(self, checked: CheckResult) -> dict[str, Any]:
+        age = self._seconds(checked.at) if checked.at else None
+        return {"busy": checked.busy, "complaint": checked.complaint, "age": age}
 
     def _order(self, entry: Any, session: str) -> dict[str, Any]:
         own, outcome = entry.request.session == session, entry.outcome
@@ -169,8 +169,8 @@ def causes(snapshot: Snapshot, feed: Feed) -> list[dict[str, str]]:
     found = [
         {"lab": title(one.lab), "t": f"t = {one.t:.2f} s", "text": one.text} for one in feed.standing.stops
     ]
-    told = snapshot.shown.told.causes if snapshot.shown else snapshot.last
-    return (found or [{"lab": title(lab), "t": "", "text": text} for lab, text in told])[:CAUSES]
+    reports = snapshot.shown.reports.causes if snapshot.shown else snapshot.last
+    return (found or [{"lab": title(lab), "t": "", "text": text} for lab, text in reports])[:CAUSES]
 
 
 def bars(feed: Feed) -> Iterator[dict[str, Any]]:

@@ -46,7 +46,7 @@ class RunCommand:
         self._modes: dict[str, tuple[str, int]] = {}
         self._alive: tuple[tuple[str, ...], int] = ((), 0)
         self._causes: list[tuple[str, str]] = []
-        self._said: deque[str] = deque(maxlen=KEPT)
+        self._lines: deque[str] = deque(maxlen=KEPT)
         self._process = started(["run", *words, "--await-start", "--reports"], subprocess.DEVNULL)
         self._reader = threading.Thread(target=self._listen, daemon=True)
         self._reader.start()
@@ -72,9 +72,9 @@ class RunCommand:
                 self._causes = [*self._causes, (lab, text)][:CAUSES]
             case {"kind": "event", "code": code, "lab": str(lab), "text": str(text)}:
                 self.ready = self.ready or code == READY
-                self._said.append(f"{lab}: {text}")
+                self._lines.append(f"{lab}: {text}")
             case {"kind": "text", "text": str(text)} if text:
-                self._said.append(text)
+                self._lines.append(text)
             case _:
                 pass
 
@@ -84,14 +84,14 @@ class RunCommand:
         return self._process.pid
 
     @property
-    def told(self) -> RunReports:
+    def reports(self) -> RunReports:
         """What it has reported."""
         names, at = self._alive
-        return RunReports(self._modes, names, at, tuple(self._causes), tuple(self._said))
+        return RunReports(self._modes, names, at, tuple(self._causes), tuple(self._lines))
 
     @property
     def over(self) -> bool:
-        """Whether it has ended and everything it said was read."""
+        """Whether it has ended and everything it wrote was read."""
         return self._process.poll() is not None and not self._reader.is_alive()
 
     @property

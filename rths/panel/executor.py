@@ -114,7 +114,7 @@ class PanelExecutor:
         self._digest = ""  # of that plan
         self._arming: Job | None = None
         self._checks: dict[str, tuple[Check, Job]] = {}
-        self._looked = {CHECK: CheckResult(), MACHINE: CheckResult()}
+        self._checked = {CHECK: CheckResult(), MACHINE: CheckResult()}
         self._last: tuple[tuple[str, str], ...] = ()
         self._shown: Shown | None = None
         self._sought = 0.0
@@ -129,13 +129,13 @@ class PanelExecutor:
     @property
     def snapshot(self) -> Snapshot:
         """Everything at this moment."""
-        looked = self._looked
-        return Snapshot(self._options.file, self._shown, looked[CHECK], looked[MACHINE], self._last)
+        checked = self._checked
+        return Snapshot(self._options.file, self._shown, checked[CHECK], checked[MACHINE], self._last)
 
     @property
     def present(self) -> Present:
         """The test that runs, and the digests of its plan and of the plan that was checked."""
-        shown, armable = self._shown, str(self._looked[CHECK].found.get("digest", ""))
+        shown, armable = self._shown, str(self._checked[CHECK].found.get("digest", ""))
         return Present(shown.test, shown.digest, armable) if shown else Present(armable=armable)
 
     def carry_out(self, word: str, digest: str, reason: str) -> Future[OrderOutcome]:
@@ -148,7 +148,7 @@ class PanelExecutor:
         return settled
 
     def close(self) -> str:
-        """End the thread; what a test that goes on needs to be told of, in a sentence, or an empty text."""
+        """End the thread; what a test that goes on must be known of, in a sentence, or an empty text."""
         self._closing.set()
         self._thread.join()
         self._opener.shutdown()
@@ -226,14 +226,14 @@ class PanelExecutor:
         words = {CHECK: ["check", *self._options.plan], MACHINE: ["doctor", *self._options.doctor]}
         check = Check(words[job.word])
         self._checks[job.word] = check, job
-        self._looked = {**self._looked, job.word: check.busy}
+        self._checked = {**self._checked, job.word: check.busy}
 
     def _follow_checks(self) -> None:
         for word, (check, job) in list(self._checks.items()):
             if (found := check.found) is None:
                 continue
             del self._checks[word]
-            self._looked = {**self._looked, word: found}
+            self._checked = {**self._checked, word: found}
             if found.complaint:
                 job.settled.set_result(OrderOutcome(REFUSED, found.complaint))
             else:
@@ -275,14 +275,14 @@ class PanelExecutor:
                 OrderOutcome(DONE, "All laboratories are armed; nothing moves before Start.")
             )
         if command.over:
-            told = command.told
-            ended = told.said[-1:] if command.code else ()
-            self._last = told.causes or tuple(("the test's command", text) for text in ended)
+            reports = command.reports
+            ended = reports.lines[-1:] if command.code else ()
+            self._last = reports.causes or tuple(("the test's command", text) for text in ended)
             self._command = None
             if arming is not None and self._arming is not None:
                 self._arming = None
                 arming.settled.set_result(
-                    OrderOutcome(REFUSED, " ".join(told.said[-1:]) or "The test ended.")
+                    OrderOutcome(REFUSED, " ".join(reports.lines[-1:]) or "The test ended.")
                 )
 
     # -- the laboratories -------------------------------------------------------------------------
@@ -352,14 +352,14 @@ class PanelExecutor:
                 own=own,
                 linked=test.linked,
                 unlinked_at=test.unlinked_at,
-                told=command.told if own and command is not None else RunReports(),
+                reports=command.reports if own and command is not None else RunReports(),
                 since_ns=round(entry.since * 1e9),
             )
         if command is None or self._armed is None:
             return None
         name = self._armed.test.name
         return Shown(
-            named(name, command.process), name, self._armed, self._digest, None, True, False, command.told
+            named(name, command.process), name, self._armed, self._digest, None, True, False, command.reports
         )
 
 

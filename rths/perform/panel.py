@@ -14,7 +14,7 @@ from functools import partial
 from common.terminal import cli
 from rths.perform.live import WINDOW, shown_somewhere
 
-# Hz of the looks at the recording and of the updates of the plots; states and bars come apart from them, as often.
+# Hz, how often the recording is read and the plots are updated; the page asks for states and bars separately, as often
 RATE = 4.0
 # Nice value of the page's part: a test that wants the processor too gets ten times as much of it, and an order is still
 # taken within milliseconds. The thread that sends the orders keeps its ordinary priority.

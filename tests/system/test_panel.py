@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from report.panel.words import WORDS
 from tests.browser import Page, chromium, open_page
 from tests.helpers import PATIENT
 from tests.processes import HANG_S, environment
-from tests.rths.panel.stand_in import StandIn
+from tests.rths.panel.stand_in import StandIn, elsewhere
 
 pytestmark = [
     pytest.mark.slow,
@@ -188,6 +189,29 @@ def test_a_stop_pressed_during_an_outage_arrives_once_after_it(panels: Panels, s
         page.wait(f"{ORDERS}.some((one) => one.startsWith('Stop: done'))", HANG_S)
         page.wait("document.getElementById('unheard').textContent === ''", HANG_S)
         assert [word for _, word in labs.presses["master"]] == ["stop"]
+    panels.end()
+
+
+def test_a_cut_link_to_the_laboratories_is_shown_until_it_is_back(panels: Panels, short_plan: Plan) -> None:
+    alert = "document.getElementById('unheard').textContent"
+    with (
+        elsewhere(with_test(short_plan, seed=10), panels.folder) as labs,
+        open_page(panels.start(), NARROW, 844) as page,
+    ):
+        page.wait(LINKED, HANG_S)
+        assert page.evaluate(alert) == ""
+        labs.send_signal(signal.SIGSTOP)
+        page.wait(f"{alert}.startsWith('The link to the laboratories is cut')", HANG_S)
+        page.wait("document.getElementById('test').textContent.includes(', not linked for ')", HANG_S)
+        assert page.evaluate("document.documentElement.scrollWidth") <= NARROW
+        page.screenshot(panels.folder / "cut.png")
+        press(page, "stop")
+        page.wait(f"{ORDERS}.some((one) => one.startsWith('Stop: not heard'))", HANG_S)
+        labs.send_signal(signal.SIGCONT)
+        page.wait(f"{alert} === ''", HANG_S)
+        press(page, "stop")
+        page.wait(f"{ORDERS}.some((one) => one.startsWith('Stop: done'))", HANG_S)
+        assert page.errors == []
     panels.end()
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import signal
+import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ from common.plan.plan import Plan
 from common.plan.read import load
 from common.protocol.messages import Answer, Operator
 from common.roles import MASTER
+from tests.processes import environment, tied
 
 
 class StandIn:
@@ -72,6 +74,18 @@ class StandIn:
                 self._ending.set()
                 for thread in self._threads:
                     thread.join()
+
+
+@contextlib.contextmanager
+def elsewhere(plan: Plan, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """The test in a process of its own while the context lasts, which is killed then; `folder` takes its plan."""
+    path = folder / "stand_in.toml"
+    path.write_text(plan.toml())
+    with subprocess.Popen(tied(sys.executable, "-m", __name__, path), env=environment()) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 if __name__ == "__main__":

@@ -18,8 +18,8 @@ from common.plan.read import with_test
 from report.panel.desk import OrderOutcome, Present
 from rths.panel.executor import Options, PanelExecutor
 from rths.perform import operate
-from tests.processes import HANG_S, environment, tied
-from tests.rths.panel.stand_in import StandIn
+from tests.processes import HANG_S
+from tests.rths.panel.stand_in import StandIn, elsewhere
 
 RUN = """
 import json, signal, sys, time
@@ -63,7 +63,7 @@ class Desk:
 def modes(desk: Desk) -> dict[str, str]:
     """The modes that the laboratories of the panel's own test have reported."""
     shown = desk.executor.snapshot.shown
-    return {lab: mode for lab, (mode, _) in shown.told.modes.items()} if shown else {}
+    return {lab: mode for lab, (mode, _) in shown.reports.modes.items()} if shown else {}
 
 
 @pytest.fixture
@@ -141,15 +141,12 @@ def test_every_order_gets_an_outcome_when_the_test_ends(desk: Desk) -> None:
 def test_a_stopped_master_is_shown_as_not_linked_until_it_answers_again(
     desk: Desk, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    (tmp_path / "plan.toml").write_text(desk.plan.toml())
-    words = tied(sys.executable, "-m", "tests.rths.panel.stand_in", tmp_path / "plan.toml")
-    with subprocess.Popen(words, env=environment()) as labs:
+    def linked() -> bool:
+        shown = desk.executor.snapshot.shown
+        return shown is not None and shown.linked
 
-        def linked() -> bool:
-            shown = desk.executor.snapshot.shown
-            return shown is not None and shown.linked
-
-        monkeypatch.setattr(operate, "PATIENCE_S", HANG_S)
+    monkeypatch.setattr(operate, "PATIENCE_S", HANG_S)
+    with elsewhere(desk.plan, tmp_path) as labs:
         until(linked)
         assert desk.give("stop").state == "done"
         labs.send_signal(signal.SIGSTOP)
@@ -164,7 +161,6 @@ def test_a_stopped_master_is_shown_as_not_linked_until_it_answers_again(
         until(linked)
         assert desk.executor.snapshot.shown == shown._replace(linked=True, unlinked_at=0)
         assert desk.give("stop").state == "done"
-        labs.kill()
     until(lambda: desk.executor.snapshot.shown is None)
 
 
@@ -275,7 +271,7 @@ def test_a_panel_that_ends_stops_an_armed_test_and_leaves_a_running_one(
     program(RUN.replace("ENDING", READY + '\nsay(kind="mode", lab="master", mode="running")'))
     running.give("arm", desk.plan.digest())
     command = until(lambda: running.executor._command)
-    until(lambda: command.told.modes["master"][0] == "running")
+    until(lambda: command.reports.modes["master"][0] == "running")
     assert "goes on as planned" in running.executor.close()
     assert not command.over
     command.interrupt()

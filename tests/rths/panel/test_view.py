@@ -63,9 +63,9 @@ class Watched:
         """Let the test's command report modes now, and which processes run."""
         now = self.clock.time
         assert self.shown is not None
-        before = dict(self.shown.told.modes)
-        told = RunReports(before | {lab: (mode, now) for lab, mode in modes.items()}, alive, now)
-        self.shown = self.shown._replace(told=told)
+        before = dict(self.shown.reports.modes)
+        reports = RunReports(before | {lab: (mode, now) for lab, mode in modes.items()}, alive, now)
+        self.shown = self.shown._replace(reports=reports)
 
     def state(self, **more: Any) -> dict[str, Any]:
         found = self.view.state(Snapshot("plan.toml", self.shown, **more), self.feed, self.page)
@@ -175,9 +175,9 @@ def test_the_largest_value_of_the_last_second_follows_a_decaying_motion(watched:
 def test_a_held_test_is_shown_as_held_until_it_resumes(watched: Watched) -> None:
     watched.tell(master="running", slave="running")
     event = {"lab": "master", "t": 1.0, "level": "info", "text": "", "values": {}}
-    for code, said in (("hold", "slowing down to a hold"), ("held", "held"), ("resumed", "running")):
+    for code, words in (("hold", "slowing down to a hold"), ("held", "held"), ("resumed", "running")):
         watched.feed.standing.event(event | {"code": code})
-        assert watched.state()["phase"] == said
+        assert watched.state()["phase"] == words
     watched.feed.standing.event(event | {"code": "held"})
     watched.tell(master="ramping", slave="ramping")
     assert watched.state()["phase"] == "ramping"
@@ -203,7 +203,7 @@ def test_causes_and_latched_laboratories_are_shown(tmp_path: Path, short_plan: P
 
 def test_before_anything_is_recorded_the_reported_causes_are_shown(watched: Watched) -> None:
     assert watched.shown is not None
-    watched.shown = watched.shown._replace(told=RunReports(causes=(("slave", "The door is open."),)))
+    watched.shown = watched.shown._replace(reports=RunReports(causes=(("slave", "The door is open."),)))
     assert watched.state()["causes"] == [{"lab": "slave", "t": "", "text": "The door is open."}]
 
 
@@ -217,8 +217,8 @@ def test_plan_and_machine_are_shown_with_the_results_of_their_commands(watched: 
     machine = {"checks": checks, "notes": ["A rival runs."], "verdict": {"sentence": "It lacks one thing."}}
     machine["realtime"] = {"missing": ["There is no right to it."]}
     watched.clock.time += SECOND
-    looked = {"plan": CheckResult(found, at=99 * SECOND), "machine": CheckResult(machine, at=100 * SECOND)}
-    state = watched.state(**looked)
+    checked = {"plan": CheckResult(found, at=99 * SECOND), "machine": CheckResult(machine, at=100 * SECOND)}
+    state = watched.state(**checked)
     assert state["plan"]["digest"] == load(plan).digest()
     assert state["plan"]["ready"]
     assert state["plan"]["age"] == pytest.approx(2.0)
