@@ -50,6 +50,7 @@ class MasterHandshake:
         self._awaits = gate is not None and gate.await_start
         self._served = False  # whether the link to every slave has passed its check
         self._waits_ns = 0  # since when the start waits for an operator, 0 where it does not
+        self._told_awaited = False  # whether the wait for the building's program has been reported
         for partner in partners if gate else ():
             partner.pass_gate(lab.plan.preflight.exchanges)
 
@@ -246,9 +247,19 @@ class MasterHandshake:
             event = Event.LOSE if isinstance(error, LostError) else Event.TRIP
             self._lab.fail(event, error, code="client")
             return True
-        if self._lab.exchange.state is State.IDLE and self.complete and self._building.awaited:
+        if self._lab.exchange.state is State.IDLE and self.complete and (whom := self._building.awaited):
             self._lab.heard_ns = self._lab.clock.now()  # nothing is armed: there is no hurry
+            self._say_awaited(whom)
         return False
+
+    def _say_awaited(self, whom: str) -> None:
+        """Report once that the test waits for the program that computes its building."""
+        if self._told_awaited:
+            return
+        self._told_awaited = True
+        text = f"Waits for {whom}."
+        told = {"t": 0.0, "lab": self._lab.name, "level": "info", "code": "await_client", "text": text}
+        self._lab.report("event", told)  # which is not recorded: there is no test time yet
 
     def _nobody(self) -> None:
         if self._lab.exchange.state is not State.IDLE:

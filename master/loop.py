@@ -358,11 +358,9 @@ class MasterLoop(RigLoop):
 
     @property
     def awaited(self) -> str:
-        """Slaves and recorder that have not joined yet, or else who is to move the laboratories."""
+        """Slaves and recorder that have not joined yet."""
         if self.lab.exchange.state is not State.IDLE:
             return ""
-        if self._handshake.complete:
-            return self._building.awaited
         missing = [partner.title for partner in self._partners if not partner.registered]
         missing += [RECORDER] * (self.lab.recorder is None and self.lab.plan.recording.required)
         return " and ".join(missing)

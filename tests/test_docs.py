@@ -31,7 +31,13 @@ from tests.faults.rows import motion_bound
 from tests.helpers import ROOT
 
 NAMES = [field.name for field in dataclasses.fields(Limits)]
-SHOWN_ONLY = {"await_start", "lacking", "open_link", "stranger"}  # before anything is recorded
+SHOWN_ONLY = {
+    "await_client",
+    "await_start",
+    "lacking",
+    "open_link",
+    "stranger",
+}  # before anything is recorded
 BY_CONSTANT = {
     "slow_rig",
     "traceback",

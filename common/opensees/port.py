@@ -6,7 +6,9 @@ clients.
 
 from __future__ import annotations
 
+import errno
 import ipaddress
+import os
 import re
 import select
 import socket
@@ -67,7 +69,10 @@ def check_free(text: str) -> None:
 
 def unusable(host: str, port: int, error: OSError) -> InputError:
     """The message for an address that cannot be served."""
-    return InputError(f"Cannot serve OpenSees at {host}:{port}: {error.strerror}; choose another port.")
+    elsewhere = error.errno == errno.EADDRNOTAVAIL
+    remedy = "give an address of this machine" if elsewhere else "choose another port"
+    reason = os.strerror(error.errno) if error.errno else str(error)  # `strerror` may repeat the address
+    return InputError(f"Cannot serve OpenSees at {host}:{port}: {reason}; {remedy}.")
 
 
 class ClientError(LostError):

@@ -15,7 +15,7 @@ from typing import Any
 from common.errors import InputError, InterlockError
 from common.lab.laboratory import Laboratory
 from common.opensees.element import Measurement, Phase, RevisedError
-from common.opensees.port import ElementPort, Ports
+from common.opensees.port import ElementPort, Ports, address_of
 from common.plan.plan import Plan
 from common.reporting import Report, silent
 from common.roles import MASTER
@@ -314,12 +314,14 @@ def compensator(plan: Plan) -> Callable[..., float]:
 
 
 def check_count(addresses: Sequence[str], laboratories: int) -> None:
-    """Raise InputError where elements are served at neither one address nor one for each laboratory."""
+    """Raise InputError where elements are served at neither one address nor a different one for each laboratory."""
     if len(addresses) not in (1, laboratories):
         raise InputError(
             f"--opensees is given {len(addresses)} times for {laboratories} laboratories: give it once for one "
             "element with all of them, or once for each in the plan's order."
         )
+    if len({address_of(text) for text in addresses}) < len(addresses):
+        raise InputError("--opensees names an address twice, but each element needs a port of its own.")
 
 
 def ports(

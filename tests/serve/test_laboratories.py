@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from common.opensees import wire
 from common.opensees.wire import MessageCode
 from common.plan.plan import Plan
 from common.plan.read import parse, with_test
+from common.reality.reality import as_planned
 from common.roles import SLAVE
 from laboratories.table.kind import TABLE
 from loop import replay
+from master.client.building import ClientBuilding, check_count
 from models.system import System
-from tests.serve.client import Element
-from tests.serve.serving import ALONE, IDEAL, serve
+from simulation import virtual
+from tests.serve.client import PATIENCE_S, Element, Script, free_port
+from tests.serve.serving import ALONE, IDEAL, Ticking, plan_of, serve
 
 STEPS = 300
 QUIET = (
@@ -124,3 +130,43 @@ def test_a_step_of_one_moving_element_is_a_step_at_rest_of_the_other(tmp_path: P
     assert of["client_step"][-1] == len(moves) + 5
     assert of["client_displacement"][1:41:2, 0] == pytest.approx(moves)
     assert not of["client_displacement"][:, 1].any()
+
+
+def test_a_test_whose_client_is_missing_says_once_what_it_waits_for(tmp_path: Path) -> None:
+    """The client starts when it has been told, after more handshake than `connect_timeout` allows a process."""
+    plan = plan_of(ALONE + "[link]\nconnect_timeout = 1.0\n")
+    number, told, late = free_port(), list[str](), threading.Event()
+    building = ClientBuilding(plan, [f"127.0.0.1:{number}"], Ticking())
+
+    def report(kind: str, data: Mapping[str, Any]) -> None:
+        if kind == "event" and data["code"] == "await_client":
+            told.append(data["text"])
+        if "waits for" in data.get("text", ""):
+            told.append(data["text"])
+
+    def begins() -> None:
+        assert late.wait(PATIENCE_S)
+        client = Element(number)
+        client.steps(3)
+        client.say(MessageCode.END)
+        client.close()
+
+    client = Script(begins)
+    bench = virtual.assemble(plan, as_planned(plan), tmp_path / "test.mcap", report, building=building)
+    look = building.look_after
+
+    def looked() -> None:
+        look()
+        if bench.world.time > 1.5e9 * plan.link.connect_timeout:
+            late.set()
+
+    building.look_after = looked  # type: ignore[method-assign]
+    assert virtual.run(bench, str) is None
+    client.join(PATIENCE_S)
+    assert client.error is None
+    assert told == [f"Waits for OpenSees at 127.0.0.1:{number}."]
+
+
+def test_one_address_for_two_elements_is_refused() -> None:
+    with pytest.raises(InputError, match="names an address twice"):
+        check_count(["8090", "127.0.0.1:8090"], 2)

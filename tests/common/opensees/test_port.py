@@ -7,6 +7,7 @@ from threading import Timer
 
 import pytest
 
+from common.errors import InputError
 from common.opensees import wire
 from common.opensees.port import ElementPort, Ports
 from tests.serve.client import free_port
@@ -30,3 +31,17 @@ def test_the_message_of_a_busy_client_is_read_without_sleeping(monkeypatch: pyte
         sending.join()
         assert ports.servers[0].header is not None
         ports.close()
+
+
+@pytest.mark.parametrize(
+    ("host", "remedy"),
+    [("192.0.2.1", "give an address of this machine"), ("127.0.0.1", "choose another port")],
+)
+def test_an_address_that_cannot_be_served_is_refused_with_the_remedy(host: str, remedy: str) -> None:
+    number = free_port()
+    with socket.create_server(("127.0.0.1", number)), pytest.raises(InputError) as refused:
+        ElementPort(f"{host}:{number}", [1e6], list[str]().append)
+    text = str(refused.value)
+    assert text.startswith(f"Cannot serve OpenSees at {host}:{number}: ")
+    assert text.endswith(f"; {remedy}.")
+    assert text.count(str(number)) == 1
