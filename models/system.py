@@ -54,6 +54,8 @@ class ColumnEffects:
     pinching: float = 0.0
     pinching_width: float = 1e-3  # m
     pinching_hardening: float = 0.0
+    pinching_law: float = 0.0  # 0 a bell without tails, 1 with tails
+    pinching_tails: float = 2.0  # how fast they fall
     friction: float = 0.0  # N
     presliding: float = 10e-6  # m, deformation of the friction's contact before it slides
     friction_velocity: float = (

@@ -105,7 +105,9 @@ class Scales:
         if parameter.follows:
             reached = self.peak(parameter.follows) or None
         if np.isinf(parameter.null) and reached:
-            sizes = [share * reached for share in LIMITS]
+            # a level that bends what comes near it is felt below it too
+            above = [size / usual for size in parameter.sizes if size > usual] if usual else []
+            sizes = [share * reached for share in (*LIMITS, *above)]
         elif reached and usual:
             sizes = [size * reached / usual for size in parameter.sizes]
         else:

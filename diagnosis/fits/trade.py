@@ -48,7 +48,7 @@ def traded(
 
     `first` are the fits with one effect, best first; no description has more than `most` effects.
     """
-    found = joined(chosen, scales)
+    found = [*joined(chosen, scales), *alone(chosen)]
     if len(chosen.names) < most:
         found += parted(bare, chosen, scales)
         found += paired(bare, chosen, first, scales)
@@ -71,6 +71,27 @@ def joined(fit: Fit, scales: Scales) -> list[Fit]:
         if kept:
             less = fitting.fit(fit.data, kept, fit.z)
             result += candidates.extended(less, scales, count=TRIED, known=fit)[:1]
+    return result
+
+
+def alone(fit: Fit) -> list[Fit]:
+    """Fits with one of two effects, where shapes that it had left out may make up for the other.
+
+    A shape that begins where it has no influence stays there in a search, which then adds an effect for what it does.
+    """
+    result = []
+    for name, values in fit.values.items() if len(fit.names) == 2 else ():
+        effect = fit.data.catalogue[name]
+        law = effect.law(values)
+        starts = law.shapes if law else {}
+        left_out = [
+            item.name
+            for item in effect.parameters
+            if item.shape and item.name in starts and values[item.name] == item.default == item.least
+        ]
+        if left_out:
+            shaped = {**values, **{shape: starts[shape] for shape in left_out}}
+            result.append(fitting.polished(fitting.fit(fit.data, {name: shaped}, fit.z)))
     return result
 
 

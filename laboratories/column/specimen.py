@@ -25,7 +25,7 @@ from models.system import ColumnEffects
 PRESENT, STIFFNESS, YIELDS, DEGRADATION, PINCHING, PINCHING_WIDTH, PINCHING_HARDENING = range(7)
 FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP, FRICTION_VELOCITY = range(7, 13)
 ASYMMETRY, DROP, SPEED, PLAY, BESIDE, CENTRES, STIFFENING, BEND = range(13, 21)
-SECOND_STIFFENING, SECOND_BEND = range(21, 23)
+SECOND_STIFFENING, SECOND_BEND, PINCHING_TAILS = range(21, 24)
 
 # places in `cell`; the last two are the specimen's place within play, and the force that it carried there
 DEFORMATION, RATE, LARGEST, SLIDER, LAST_STEP, REACTION, INSIDE, CARRIED = range(8)
@@ -97,6 +97,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         bend,
         more.stiffening_second * column.stiffness if more.stiffening_law == TWICE else 0.0,
         more.stiffening_second_bend,
+        more.pinching_tails if more.pinching_law else 0.0,
     ]
     law = np.array(more.learned)
     return Specimen(
@@ -209,6 +210,12 @@ def carried(specimen: Specimen, within: float) -> float:
     return result
 
 
+@jit
+def bell(square: float, tails: float) -> float:
+    """Share of pinching's reduction that is left at a squared deformation over its width; `tails` as in its law 1."""
+    return np.exp(-square) if tails == 0.0 else (1.0 + square / tails) ** -tails
+
+
 @jit_apart
 def with_effects(specimen: Specimen, deformation: float, step: float) -> float:
     """`force` for a specimen with effects."""
@@ -226,7 +233,7 @@ def with_effects(specimen: Specimen, deformation: float, step: float) -> float:
     if effects[DEGRADATION] != 0.0:
         result *= 1.0 - effects[DEGRADATION] * (1.0 - np.exp(-cell[LARGEST] / DEGRADED_AT))
     if effects[PINCHING] != 0.0:
-        closed = np.exp(-((within / effects[PINCHING_WIDTH]) ** 2))
+        closed = bell((within / effects[PINCHING_WIDTH]) ** 2, effects[PINCHING_TAILS])
         result *= 1.0 - effects[PINCHING] * closed + effects[PINCHING_HARDENING] * (1.0 - closed)
     moved = deformation - cell[DEFORMATION]
     rate = moved / step

@@ -10,7 +10,9 @@ from common.plan.plan import Plan
 from common.roles import MASTER
 from diagnosis.fits import fitting, hypothesis, laws, residuals
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.residuals import Data
+from diagnosis.fits.trade import alone, simplest
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.nuisances import Nuisance
 from diagnosis.recorded.parts import ColumnAlone, Part
@@ -142,3 +144,42 @@ def test_a_parameter_that_a_law_lacks_is_not_fitted() -> None:
         },
         **{place: {"yield_displacement", *Driven.TRUE} for place in (6, 8, 10)},
     }
+
+
+class Cracked(ColumnAlone):
+    """A column alone whose force is low around the origin, by a bell that no law of the catalogue is."""
+
+    def __init__(self) -> None:
+        self.signals, self.nuisances = ("column_force",), ()
+        self.candidates = tuple(CATALOGUE[f"column.{name}"] for name in ("pinching", "stiffness"))
+        self.role = MASTER
+        self.inputs = swelling()
+        weight = 1.0 / np.cosh(self.inputs / 0.5e-3)
+        force = K * self.inputs * (1.0 - 0.3 * weight + 0.2 * (1.0 - weight))
+        self.measured = (force + NOISE * np.random.default_rng(4).standard_normal(TICKS))[:, None]
+        self.present = np.ones((TICKS, 1), dtype=bool)
+
+
+def cracked(values: Values) -> Fit:
+    group, train = residuals.withheld(TICKS, INTERVAL)
+    level = np.array([NOISE])
+    data = Data(Cracked(), System(Plan()), level, level, group, train, np.zeros(1))
+    return fitting.fit(data, values, rounds=3)
+
+
+def test_cracks_that_close_by_an_unknown_bell_are_pinching_with_tails() -> None:
+    first = {"factor": 0.3, "width": 0.001, "hardening": 0.1}
+    (found,) = laws.in_best_laws([cracked({"column.pinching": first})])
+    values = found.values["column.pinching"]
+    assert CATALOGUE["column.pinching"].laws[int(values["law"])].name == "with tails"
+    np.testing.assert_allclose(values["factor"], 0.3, atol=0.06)
+    np.testing.assert_allclose(values["hardening"], 0.2, atol=0.06)
+    assert found.chi < 1.2 * found.reduced.size
+
+
+def test_an_effect_whose_left_out_shape_does_what_a_second_effect_does_stands_alone() -> None:
+    pinching = {"factor": 0.4, "width": 0.5e-3, "hardening": 0.0, "tails": 2.0, "law": 1.0}
+    both = cracked({"column.pinching": pinching, "column.stiffness": {"factor": 1.2}})
+    (one,) = alone(both)
+    assert one.names == ("column.pinching",)
+    assert simplest([both, one])[0] is one

@@ -8,6 +8,7 @@ import pytest
 from diagnosis.fits import candidates, fitting, residuals, unexplained
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
+from laboratories.effects import CATALOGUE
 from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, named, white
 
 ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth, relative error allowed
@@ -143,3 +144,11 @@ def test_an_impaired_link_is_found_and_nothing_else(cases: Cases, kind: str) -> 
         for name, true in values.items():
             assert estimate(report, effect, name) == pytest.approx(true, rel=0.3), name
     assert report["how_far"]["after"] < 1.2 * report["how_far"]["noise_floor"]
+
+
+def test_a_reading_that_saturates_is_also_looked_for_above_what_was_reached(cases: Cases) -> None:
+    record = cases.record()
+    scales, effect = Scales(record), CATALOGUE["sensor.column_force.saturation"]
+    limits = [values["limit"] for _, values in scales.starts(effect)]
+    peak = scales.peak("column_force")
+    assert min(limits) < peak < 2.0 * peak < max(limits)

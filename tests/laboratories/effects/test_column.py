@@ -184,6 +184,14 @@ def test_a_pinched_column_follows_its_formula_and_is_odd(
     assert mirrored == -got
 
 
+@given(tails=st.floats(0.5, 20.0), width=st.floats(1e-4, 1e-2), where=st.floats(-1e-2, 1e-2))
+def test_a_pinched_column_with_tails_follows_its_formula(tails: float, width: float, where: float) -> None:
+    more = ColumnEffects(pinching=0.4, pinching_width=width, pinching_law=1.0, pinching_tails=tails)
+    (got,) = specimen_under(np.array([where]), more)
+    weight = (1.0 + (where / width) ** 2 / tails) ** -tails
+    assert got == pytest.approx(K * where * (1.0 - 0.4 * weight), rel=1e-12, abs=1e-9)
+
+
 @given(gap=st.floats(2e-5, 1e-3), where=st.floats(-3e-3, 3e-3))
 def test_a_loose_column_has_no_force_inside_its_gap(gap: float, where: float) -> None:
     (got,) = specimen_under(np.array([where]), ColumnEffects(slip=gap))
