@@ -69,9 +69,9 @@ def by_rig(bench: Bench, lab: str, last: int, first: int, *, held: bool) -> tupl
     written = bench.logs[lab].written()
     if held:
         first = last + int(np.argmax(np.diff(written.ns[last:]))) + 1
-    between = np.diff(written.ns[last - 20 : first + 1])
-    if not held and between.max(initial=0) > (PAUSE + INTERVAL) * 1e9:
-        raise DisturbedError(f"the {lab} paused for {between.max() * 1e-6:.1f} ms")
+    late = written.ns[last - 20 : first + 1] - np.arange(first - last + 21) * INTERVAL * 1e9
+    if not held and np.ptp(late) > PAUSE * 1e9:
+        raise DisturbedError(f"a command of the {lab} was {np.ptp(late) * 1e-6:.1f} ms later than another")
     motion = np.max(np.abs(written.displacement[last:] - written.displacement[last]))
     return float(written.ns[first] - written.ns[last]) * 1e-9, float(motion)
 

@@ -14,13 +14,14 @@ from pathlib import Path
 
 import pytest
 
+from common.errors import LostError
 from common.recording.reader import read
 from common.udp.packets import RigState
 from common.udp.peer import Peer
 from common.udp.rig import Terms, echoes
 from tests.helpers import ROOT
 from tests.processes import HANG_S, environment
-from tests.system.faults.bench import INTERVAL, undisturbed
+from tests.system.faults.bench import INTERVAL, DisturbedError, undisturbed
 
 pytestmark = pytest.mark.faults
 
@@ -81,8 +82,12 @@ def test_a_killed_rig_ends_the_test_with_one_sentence_and_both_laboratories_come
     def scenario(folder: Path) -> None:
         with running(folder) as (test, rig, _):
             rig.kill()
-            assert test.wait(30.0) == 3
-        assert "for 5 intervals in a row no valid answer was there" in (folder / "said").read_text()
+            code = test.wait(30.0)
+        said = (folder / "said").read_text()
+        if code == LostError.exit_code:
+            raise DisturbedError(f"a laboratory was held up first: {said}")
+        assert code == 3
+        assert "for 5 intervals in a row no valid answer was there" in said
         modes = [event for event in read(folder / "p.mcap").events if event["code"] == "mode"]
         last = {event["lab"]: event["text"] for event in modes}
         assert all("→ safe" in text for text in last.values()), last
