@@ -3,7 +3,11 @@
 Below v₀ the force decreases to zero, which makes the law smooth. At higher speeds friction is lower than at low ones,
 or higher if d < 0.
 
-B. Armstrong-Hélouvry, P. Dupont and C. Canudas de Wit, Automatica 30 (1994), 1083-1138, section 2.
+Before it slides, a contact gives way as if by bristles: after a reversal the force approaches its size F_s over a
+distance, the presliding s₀: `dF/ds = (F_s − F)/s₀` with F_s against the motion.
+
+B. Armstrong-Hélouvry, P. Dupont and C. Canudas de Wit, Automatica 30 (1994), 1083-1138, section 2. P. R. Dahl, A
+solid friction model, Aerospace Corporation TOR-0158(3107-18)-1 (1968).
 """
 
 from __future__ import annotations
@@ -23,3 +27,10 @@ def left(rate: float, velocity: float, drop: float, speed: float) -> float:
     if drop != 0.0:
         share *= 1.0 - drop * (1.0 - np.exp(-size / speed))
     return float(share)
+
+
+@jit
+def dahl(force: float, moved: float, least: float, most: float, presliding: float) -> float:
+    """The force (N) of bristles after a move (m), from the force before; they slide at `least` or at `most` N."""
+    end = most if moved > 0.0 else least
+    return float(end + (force - end) * np.exp(-abs(moved) / presliding))

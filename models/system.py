@@ -99,6 +99,7 @@ class DamperEffects:
     friction_asymmetry: float = 0.0  # share more in the positive direction, and less in the other
     friction_drop: float = 0.0  # share that is lost at speed
     friction_speed: float = 0.02  # m/s, at which two thirds of that are lost
+    presliding: float = 0.0  # m, in which the friction's bristles bend; 0 for a friction that sticks at once
     force_limit: float = math.inf  # N
     offset: float = 0.0  # N, a constant force on the moving mass
     stop_stroke: float = math.inf  # m

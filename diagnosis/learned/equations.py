@@ -20,6 +20,7 @@ from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.systematic import systematic
 from loop import replay
+from models import friction
 from models.registry import Array
 from models.system import DamperEffects, System, TableEffects
 
@@ -134,6 +135,18 @@ def friction_of(effects: TableEffects | DamperEffects, rate: Array) -> Array:
     return result
 
 
+def bristles_of(effects: DamperEffects, stroke: Array) -> Array:
+    """The force (ticks,) N of a rail with presliding over its stroke (m), from rest."""
+    result, force = np.zeros(stroke.size), 0.0
+    least, most = (
+        side * effects.friction * (1.0 + side * effects.friction_asymmetry) for side in (-1.0, 1.0)
+    )
+    for tick, moved in enumerate(np.diff(stroke).tolist(), 1):
+        force = friction.dahl(force, moved, least, most, effects.presliding)
+        result[tick] = force
+    return result
+
+
 def of_damper(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
     """The damper's force over its stroke."""
     places = [part.lab.kind.channels.names.index(name) for name in ("damper_stroke", "damper_force")]
@@ -159,7 +172,7 @@ def damper_force(system: System, stroke: Array, rate: Array, command: Array) -> 
     kept = float(np.exp(-system.plan.test.interval / lag)) if lag > 0.0 else 0.0
     motor = lfilter([0.0, 1.0 - kept], [1.0, -kept], wanted)
     over = stroke - np.clip(stroke, -effects.stop_stroke, effects.stop_stroke)
-    rubbing = friction_of(effects, rate)
+    rubbing = bristles_of(effects, stroke) if effects.presliding else friction_of(effects, rate)
     beside: Array = effects.stop_stiffness * over + rubbing - effects.offset
     return damper.stiffness * stroke + damper.damping * rate + beside - motor
 

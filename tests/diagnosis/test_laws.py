@@ -1,4 +1,4 @@
-"""A column that yields by any law of the catalogue is named as yielding, and the fit names the law."""
+"""A mechanism that follows any of its laws is named as that mechanism, and the fit names the law."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from diagnosis.recorded.nuisances import Nuisance
 from diagnosis.recorded.parts import ColumnAlone, Part
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect
+from laboratories.table.kind import TABLE
 from loop import replay
 from models.registry import Array
 from models.specimens.fit import forces
@@ -183,3 +184,53 @@ def test_an_effect_whose_left_out_shape_does_what_a_second_effect_does_stands_al
     (one,) = alone(both)
     assert one.names == ("column.pinching",)
     assert simplest([both, one])[0] is one
+
+
+class RubbingDamper:
+    """A damper on a standing table whose carriage bends bristles before it slides, in 50 µs steps of its equation."""
+
+    name, role, exact = "laboratory B", "slave", False
+    signals: tuple[str, ...] = ("damper_stroke", "damper_force")
+    nuisances: tuple[Nuisance, ...] = ()
+    candidates: tuple[Effect, ...] = (CATALOGUE["damper.friction"],)
+    TICKS, FORCE, PRESLIDING, STEPS = 2000, 3.0, 4e-4, 40
+
+    def __init__(self) -> None:
+        t = np.arange(self.TICKS) * INTERVAL
+        push = 15.0 * np.sin(2.0 * np.pi * 0.8 * t) * np.sin(np.pi * t / t[-1])
+        self.drive = np.stack([np.zeros(self.TICKS), push], axis=1)
+        damper, h = Plan().damper, INTERVAL / self.STEPS
+        stroke = rate = rubbing = motor = 0.0
+        rows = [(0.0, 0.0)]
+        for command in push[:-1].tolist():
+            for _ in range(self.STEPS):
+                motor += h * (command - motor) / damper.motor_time_constant
+                rate -= (
+                    h * (damper.stiffness * stroke + damper.damping * rate + rubbing - motor) / damper.mass
+                )
+                stroke += h * rate
+                rubbing += h * (self.FORCE * rate - abs(rate) * rubbing) / self.PRESLIDING
+            rows.append((stroke, damper.stiffness * stroke + damper.damping * rate + rubbing - motor))
+        self.level = np.array([2e-6, 0.02])
+        noise = np.random.default_rng(3).standard_normal((self.TICKS, 2))
+        self.measured = np.array(rows) + self.level * noise
+        self.present = np.ones((self.TICKS, 2), dtype=bool)
+
+    def predict(self, system: System) -> Array:
+        return replay.laboratory(TABLE, system, self.drive)[:, 2:]
+
+    def first(self, ticks: int) -> RubbingDamper:
+        raise NotImplementedError
+
+
+def test_friction_with_presliding_is_found_with_its_distance() -> None:
+    part = RubbingDamper()
+    group, train = residuals.withheld(part.TICKS, INTERVAL)
+    data = Data(part, System(Plan()), part.level, part.level, group, train, np.zeros(2))
+    before = fitting.fit(data, {"damper.friction": {"force": 2.0, "velocity": 1e-6}})
+    (found,) = laws.in_best_laws([before])
+    values = found.values["damper.friction"]
+    assert CATALOGUE["damper.friction"].laws[int(values["law"])].name == "with presliding"
+    np.testing.assert_allclose(values["force"], part.FORCE, rtol=0.01)
+    np.testing.assert_allclose(values["presliding"], part.PRESLIDING, rtol=0.03)
+    assert fitting.excess(found) < 0.1 * fitting.excess(before)

@@ -112,6 +112,54 @@ def test_smoothed_friction_acts_like_a_dashpot_at_small_speed() -> None:
     assert decrement == pytest.approx(2.0 * math.pi * ratio / math.sqrt(1.0 - ratio**2), rel=0.01)
 
 
+RESTING = Damper(
+    mass=1e7, stiffness=0.0, damping=0.0, motor_time_constant=0.0
+)  # while the table moves under it
+
+
+def test_a_rail_with_presliding_follows_dahls_loop() -> None:
+    """Over half a cycle from one turn to the next: F·(1 − (1 + tanh(A/s₀))·exp(−x/s₀)), A the amplitude."""
+    friction, presliding, amplitude, frequency = 3.0, 2e-3, 4e-3, 2.0
+    t = np.arange(1, 8001) * SHORT
+    motion = amplitude * np.sin(2.0 * np.pi * frequency * t)
+    more = DamperEffects(friction=friction, presliding=presliding)
+    table = ShakingTable(delay=0.0, frequency=2000.0)  # follows its command
+    got = run_b(motion, table=table, damper=RESTING, damper_effects=more, interval=SHORT)
+    last = got[-round(1.0 / (frequency * SHORT)) :]
+    stroke, force = last[:, STROKE], last[:, FORCE]
+    low, high = int(np.argmin(stroke)), int(np.argmax(stroke))
+    way = np.arange(low, high + (stroke.size if high < low else 0)) % stroke.size
+    x = stroke[way] - stroke[low]
+    height = np.tanh(0.5 * (stroke[high] - stroke[low]) / presliding)
+    expected = friction * (1.0 - (1.0 + height) * np.exp(-x / presliding))
+    assert np.max(np.abs(force[way] - expected)) < 0.01 * friction
+
+
+@pytest.mark.parametrize("share", [0.5, -0.9])
+def test_a_rail_with_presliding_gives_way_under_a_push_below_its_friction(share: float) -> None:
+    """At rest its bristles carry the push: s = −s₀·ln(1 − |push|/F)."""
+    friction, presliding = 3.0, 1e-4
+    damper = Damper(stiffness=0.0, damping=3000.0)  # so slow that it does not swing over
+    more = DamperEffects(friction=friction, presliding=presliding)
+    push = np.full(4000, share * friction)
+    got = run_b(np.zeros(push.size), push, damper=damper, damper_effects=more)
+    bent = -presliding * math.log(1.0 - abs(share))
+    assert got[-1, STROKE] == pytest.approx(math.copysign(bent, share), rel=0.01)
+    assert abs(got[-1, FORCE]) < 1e-3 * friction
+
+
+def test_friction_with_stiff_bristles_becomes_coulombs() -> None:
+    motor = tones(2000, size=20.0)
+    sticking = run_b(np.zeros(2000), motor, damper_effects=DamperEffects(friction=3.0))
+    bristled = run_b(np.zeros(2000), motor, damper_effects=DamperEffects(friction=3.0, presliding=1e-9))
+    assert np.max(np.abs(bristled - sticking)[:, STROKE]) < 1e-4 * np.max(np.abs(sticking[:, STROKE]))
+    sides = DamperEffects(friction=3.0, friction_asymmetry=0.2, presliding=1e-4)
+    push = np.full(200, 60.0)
+    rubbing = run_b(np.zeros(200), push, damper_effects=sides)[100:, STROKE_RATE]
+    braked = run_b(np.zeros(200), push, damper_effects=DamperEffects(offset=-3.6))[100:, STROKE_RATE]
+    assert rubbing[-1] - rubbing[0] == pytest.approx(braked[-1] - braked[0], rel=1e-3)
+
+
 @pytest.mark.parametrize("limit", [35.0, 20.0])
 def test_the_motors_force_is_limited(limit: float) -> None:
     """A damper without spring and dashpot, and no motor lag: its force is the motor's, the other way."""
@@ -203,11 +251,12 @@ ALL_DAMPER = DamperEffects(
     "damper_effects",
     [
         DamperEffects(friction=3.0),
+        DamperEffects(friction=3.0, presliding=1e-4),
         DamperEffects(stop_stroke=0.02, stop_stiffness=20000.0),
         DamperEffects(force_limit=20.0, gain=1.1),
         ALL_DAMPER,
     ],
-    ids=["friction", "stop", "motor", "everything"],
+    ids=["friction", "presliding", "stop", "motor", "everything"],
 )
 def test_the_dampers_force_balances_its_motion_with_every_effect(
     table_effects: TableEffects, damper_effects: DamperEffects

@@ -1,13 +1,29 @@
 """Coulomb friction of the damper's guide rail.
 
-A force of constant size against the stroke's velocity; at rest it balances the applied force up to that size.
+A force of constant size against the stroke's velocity; at rest it balances the applied force up to that size. The
+parameter `law` chooses another formula:
+
+    1   larger by the share `asymmetry` in the positive direction and smaller by it in the negative one, and less by
+        the share `drop` at high speed
+    2   with presliding (Dahl's law): rail and carriage touch by elastic bristles, which bend before they slide,
+
+            dF/ds = (force·sgn(ds) − F)/presliding
+
+        so that the force of a carriage turned around reaches its size only over a few times that distance
+
+Not to be confused with `damper.viscous`, whose force grows with speed: presliding depends on the way since the last
+reversal alone.
 """
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Parameter
+from dataclasses import replace
+
+from laboratories.effects.effect import Law, Parameter
 from laboratories.effects.friction import FURTHER, VELOCITY, laws
 from laboratories.effects.laws import sets
+
+COULOMB = {"velocity": 1e-6}
 
 EFFECT = sets(
     "damper",
@@ -16,8 +32,25 @@ EFFECT = sets(
         "friction": Parameter("force", "N", null=0.0, least=0.0, most=200.0, sizes=(0.3, 1.0, 3.0, 10.0)),
         "friction_velocity": VELOCITY,
     },
-    further=FURTHER,
-    laws=laws({"velocity": 1e-6}),
+    further=FURTHER
+    | {
+        "": replace(
+            FURTHER[""],
+            most=2.0,
+            says="0 the same in both directions and at all speeds, 1 by direction and speed, 2 with presliding",
+        ),
+        "presliding": Parameter(
+            "presliding",
+            "m",
+            null=0.0,
+            least=1e-6,
+            most=0.005,
+            sizes=(3e-05, 0.0005),
+            says="distance over which the force of law 2 approaches its size after a reversal",
+            shape=True,
+        ),
+    },
+    laws=(*laws(COULOMB), Law("with presliding", {"presliding": 1e-4}, fixed=COULOMB)),
     says="Coulomb friction of the guide rail",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",
 )
