@@ -7,29 +7,38 @@ import json
 import os
 import re
 import select
+import signal
 import subprocess
 import tempfile
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from typing import IO, Any
 
+TRACEBACK = "Traceback (most recent call last):"
+# types whose text is a sentence by itself; of others, such as KeyError, the type says what the text means
+PLAIN = ("RuntimeError", "ValueError", "ModuleNotFoundError")
+TYPED = re.compile(rf"^(?:{'|'.join(PLAIN)}): ")
+# text of an exception of a library that wrote the reason on standard error just before
+BEFORE = "See stderr output"
+
 
 class EndedError(Exception):
-    """The program has ended; the text is the last line of its standard error."""
+    """The program has ended; the text says why, as far as its standard error does."""
 
 
 class PipedProgram:
     """The program of the command `words`, whose first line of input is `task` as JSON.
 
     It has a process group of its own, so that Ctrl-C, which the terminal sends to a whole group, does not reach it.
-    `noise` is a part of the lines of its standard error that say nothing about a failure.
+    `noise` is a part of the lines of its standard error that say nothing about a failure. `task["model"]` is the file
+    of a user that it runs, if it runs one: of an exception in that file the line is told.
 
     Raises:
         OSError: it cannot be started.
     """
 
     def __init__(self, words: Sequence[str], task: Mapping[str, Any], noise: bytes = b"") -> None:
-        self._noise, self._read = noise, b""
+        self._noise, self._read, self._file = noise, b"", str(task.get("model", ""))
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
         try:
             self._process = subprocess.Popen(
@@ -68,16 +77,41 @@ class PipedProgram:
         return found
 
     def last_words(self) -> str:
-        """The last line of its standard error, without the type of an exception."""
+        """Why it ended: a signal, an exception with its line in the user's file, or its last line of standard error."""
         if self._said.closed:
             return "its process is closed"
+        code: int | None = None
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(timeout=1.0)
+            code = self._process.wait(timeout=1.0)
         self._said.seek(0)
         lines = [line for line in self._said.read().splitlines() if line.strip()]
         lines = [line for line in lines if not self._noise or self._noise not in line]
-        last = lines[-1].decode(errors="replace").strip() if lines else "it said nothing"
-        return re.sub(r"^\w+Error: ", "", last)
+        if code is not None and code < 0:
+            return f"its process was ended by signal {-code}, {signal.strsignal(-code)}"
+        if not lines:
+            return f"its process said nothing{'' if code is None else f' and ended with exit code {code}'}"
+        return reason([line.decode(errors="replace") for line in lines], self._file)
+
+
+def reason(lines: Sequence[str], file: str = "") -> str:
+    """The reason in what a program wrote on standard error, in one line.
+
+    Of an exception it is its text, with its type unless the text is a sentence by itself, and its line in the user's
+    `file`. Else it is the last line.
+    """
+    marks = [number for number, line in enumerate(lines) if line == TRACEBACK]
+    if not marks:
+        return TYPED.sub("", lines[-1].strip())
+    trace = lines[marks[-1] + 1 :]
+    frames = [number for number, line in enumerate(trace) if line.startswith("  ")]
+    text = " ".join(line.strip() for line in trace[frames[-1] + 1 if frames else 0 :])
+    if text.endswith(BEFORE):
+        text = lines[marks[-1] - 1].strip() if marks[-1] else text
+    places = [
+        found[1] for line in trace if (found := re.match(rf'\s+File "{re.escape(file)}", line (\d+)', line))
+    ]
+    at = f"line {places[-1]}: " if file and places else ""
+    return at + TYPED.sub("", text)
 
 
 def _end(process: subprocess.Popen[bytes], said: IO[bytes]) -> None:

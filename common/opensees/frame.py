@@ -36,17 +36,12 @@ class Frame:
     applies must be constant when it returns.
 
     Raises:
-        ValueError: `build` returns something else.
+        ValueError: there is no `build`, it returns something else, or it makes no element.
     """
 
     def __init__(self, ops: Any, task: dict[str, Any]) -> None:
         self._ops, self._interval, self._begun = ops, float(task["interval"]), False
-        found = runpy.run_path(task["model"])["build"](ops, **task["options"])
-        try:
-            floors, self._dof = found
-            self.floors = [int(node) for node in floors]
-        except (TypeError, ValueError):
-            raise ValueError(f"build returns {found!r}, but must return nodes and a direction") from None
+        self.floors, self._dof = self._built(task["model"], task["options"])
         ops.wipeAnalysis()
         self._stiffness = [float(k) for k in task["stiffness"]] + [0.0] * len(self.floors)
         for storey, node in enumerate(self.floors):
@@ -55,6 +50,27 @@ class Frame:
         self._analyse()
         self._zero = [float(ops.nodeDisp(node, self._dof)) for node in self.floors]
         self._ahead = [0.0] * len(self.floors)  # displacements for the end of the interval, m
+
+    def _built(self, file: str, options: dict[str, Any]) -> tuple[list[int], int]:
+        """Make the model; the nodes of its floors and their direction."""
+        build = runpy.run_path(file).get("build")
+        if build is None:
+            raise ValueError("it has no function build(ops, **options)")
+        found = build(self._ops, **options)
+        try:
+            nodes, dof = found
+            floors, dof = [int(node) for node in nodes], int(dof)
+        except (TypeError, ValueError):
+            raise ValueError(f"build returns {found!r}, but must return nodes and a direction") from None
+        if not self._ops.getEleTags():
+            raise ValueError("build makes no element")
+        known = self._ops.getNodeTags()
+        for node in floors:
+            if node not in known:
+                raise ValueError(f"build returns node {node}, which is not in the model")
+            if not 1 <= dof <= (count := len(self._ops.nodeDisp(node))):
+                raise ValueError(f"build returns direction {dof}, but must return one from 1 to {count}")
+        return floors, dof
 
     def _brace(self, storey: int, node: int) -> None:
         """Put the spring of the laboratories of a storey between its floors, or between floor and ground."""

@@ -25,6 +25,10 @@ INTERPRETER = (
 INSTALL = f"`make opensees` installs OpenSeesPy, or {INTERPRETER} names an interpreter that has it"
 ENDED = b"Process 0 Terminating"  # the line that OpenSees writes whenever it ends
 
+# what a specimen lacks where its force is no number, and what its user may do: of a model, and of a material
+UNSOLVED = ("no equilibrium of", "refine the model, or lower scale in [ground_motion]")
+UNDEFINED = ("no force of", "correct its row in materials")
+
 
 class SpecimenProcess:
     """The process; `task` is {"materials": rows} or {"model": file, "options": {…}}, `name` is for messages.
@@ -35,6 +39,7 @@ class SpecimenProcess:
 
     def __init__(self, name: str, task: Mapping[str, Any]) -> None:
         self._name = name
+        self._lacks, self._remedy = UNSOLVED if task.get("model") else UNDEFINED
         self._program = started(server.__file__, task)
         self.close = self._program.close
         try:
@@ -53,11 +58,10 @@ class SpecimenProcess:
             self._program.send(server.COUNT.pack(len(way)) + struct.pack(f"<{len(way)}d", *way))
             found = self._answer()
         except EndedError as error:
-            raise RigError(f"OpenSees has ended as the specimen {self._name} ({error})") from None
+            raise RigError(f"OpenSees has ended as the specimen {self._name} ({error}).") from None
         if math.isnan(found):
             raise RigError(
-                f"OpenSees finds no equilibrium of {self._name} at {way[-1] * 1e3:.4g} mm: refine the model, or "
-                "lower scale in [ground_motion]"
+                f"OpenSees finds {self._lacks} {self._name} at {way[-1] * 1e3:.4g} mm: {self._remedy}."
             )
         return found
 

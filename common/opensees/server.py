@@ -48,11 +48,14 @@ class Model:
     """A model in a file of the user, whose `build(ops, **options)` returns the node and the direction to be moved.
 
     `build` may apply loads, as an axial force; they must be constant when it returns.
+
+    Raises:
+        ValueError: there is no `build`, it returns something else, or it makes no element.
     """
 
     def __init__(self, ops: Any, file: str, options: dict[str, Any]) -> None:
         self._ops, self._at = ops, 0.0
-        self._node, self._dof = runpy.run_path(file)["build"](ops, **options)
+        self._node, self._dof = self._built(file, options)
         ops.wipeAnalysis()
         ops.timeSeries("Linear", OWN)
         ops.pattern("Plain", OWN, OWN)
@@ -68,6 +71,25 @@ class Model:
         ops.integrator("DisplacementControl", self._node, self._dof, 0.0)
         ops.analysis("Static", "-noWarnings")
         self._zero = float(ops.nodeDisp(self._node, self._dof))
+
+    def _built(self, file: str, options: dict[str, Any]) -> tuple[int, int]:
+        """Make the model; node and direction to be moved."""
+        build = runpy.run_path(file).get("build")
+        if build is None:
+            raise ValueError("it has no function build(ops, **options)")
+        found = build(self._ops, **options)
+        try:
+            node, dof = map(int, found)
+        except (TypeError, ValueError):
+            raise ValueError(f"build returns {found!r}, but must return a node and a direction") from None
+        if not self._ops.getEleTags():
+            raise ValueError("build makes no element")
+        if node not in self._ops.getNodeTags():
+            raise ValueError(f"build returns node {node}, which is not in the model")
+        count = len(self._ops.nodeDisp(node))
+        if not 1 <= dof <= count:
+            raise ValueError(f"build returns direction {dof}, but must return one from 1 to {count}")
+        return node, dof
 
     def force(self, way: Iterable[float]) -> float:
         """The force (N) at the end of a path of deformations (m); NaN if no equilibrium is found."""

@@ -21,6 +21,7 @@ from common.plan.plan import Plan
 from common.reality.reality import Reality
 from common.roles import MASTER, RECORDER
 from common.terminal import cli
+from common.terminal.outputs import is_stream
 from report.text.forwarded import ForwardedProgress
 from report.text.progress import Progress as Working
 from report.text.terminal import RunProgress
@@ -213,7 +214,10 @@ def in_real_time(
             view.close()
             if output.is_file() and output.stat().st_size:
                 progress.say(f"live view: {view.again} shows it again")
-    return verdict(processes, stopping())
+    error = verdict(processes, stopping())
+    if isinstance(error, InputError) and not ending.agreed and not is_stream(output):
+        output.unlink(missing_ok=True)  # the recorder had begun it, but there was no test
+    return error
 
 
 def shown(output: Path, port: int) -> View:

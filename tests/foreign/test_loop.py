@@ -198,6 +198,13 @@ def test_the_step_times_of_a_model_are_judged_in_real_time_only() -> None:
     assert good.text == (
         "A step of the building 'frame.py' takes 1.00 ms, 99% of 100 at most 1.40 ms: it holds intervals from 1.9 ms on"
     )
+    held = foreign.judged(plan, "frame.py", [1e-3] * 95 + [9e-3] * 5, paced=True)
+    assert held.risk is None  # of emulated laboratories
+    assert held.text.endswith(
+        "from 12.0 ms on; the emulated laboratories hold over the steps that come later"
+    )
+    real = parse(FOREIGN + '[master.rig]\naddress = "udp/127.0.0.1:9107"\n', Path())
+    assert foreign.judged(real, "frame.py", [1e-3] * 95 + [9e-3] * 5, paced=True).risk is not None
     slow = foreign.judged(plan, "frame.py", [2.0 * one for one in ranked], paced=True)
     assert slow.risk is not None
     assert slow.risk.name == "building"

@@ -177,9 +177,25 @@ def test_two_models_at_once_run_in_separate_processes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("def build(ops):\n    raise RuntimeError('no such bar')\n", "cannot be the building (no such bar)."),
+        (
+            "def build(ops):\n    raise RuntimeError('no such bar')\n",
+            "cannot be the building (line 2: no such bar).",
+        ),
+        ("def build(ops:\n", "cannot be the building (line 1: SyntaxError: '(' was never closed)."),
+        ("def build(ops):\n    return {}['bar'], 1\n", "cannot be the building (line 2: KeyError: 'bar')."),
+        (
+            "raise SystemExit(7)\n",
+            "cannot be the building (its process said nothing and ended with exit code 7).",
+        ),
+        ("def build(ops):\n    ops.fix(1, 1)\n", "cannot be the building (line 2: "),
         ("def build(ops):\n    return 3\n", "must return nodes and a direction"),
-        ("x = 1\n", "cannot be the building ('build')"),
+        ("x = 1\n", "cannot be the building (it has no function build(ops, **options))."),
+        (ROD.replace("ops.element", "0 and ops.element"), "cannot be the building (build makes no element)."),
+        (ROD.replace("[2] *", "[3] *"), "(build returns node 3, which is not in the model)."),
+        (
+            ROD.replace("* floors, 1", "* floors, 2"),
+            "(build returns direction 2, but must return one from 1 to 1).",
+        ),
         (ROD.replace("floors=1", "floors=2"), "has 2 floors, but [structure] gives 1 masses"),
     ],
 )
@@ -202,7 +218,7 @@ def test_after_a_models_process_dies_the_laboratories_are_safe_and_the_recording
     building: Any = bench.master._building
     os.kill(building._model._program._process.pid, signal.SIGKILL)
     error = virtual.run(bench, str)
-    assert str(error) == "The building 'rod.py' has ended: it said nothing."
+    assert str(error) == "The building 'rod.py' has ended: its process was ended by signal 9, Killed."
     assert error is not None
     assert error.exit_code == 3
     run = read(tmp_path / "a.mcap")

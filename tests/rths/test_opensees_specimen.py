@@ -39,6 +39,18 @@ def played(text: str, path: Path, **tables: Any) -> Run:
     return read(path)
 
 
+ROD = """
+def build(ops):
+    ops.model('basic', '-ndm', 1, '-ndf', 1)
+    ops.node(1, 0.0)
+    ops.node(2, 1.0)
+    ops.fix(1, 1)
+    ops.uniaxialMaterial('Elastic', 1, 1e6)
+    ops.element('Truss', 1, 1, 2, 1.0, 1)
+    return 2, 1
+"""
+
+
 @with_opensees
 def test_an_elastic_material_gives_the_bits_of_the_emulated_column(tmp_path: Path) -> None:
     text = "[test]\nduration = 1.0\n[ground_motion]\nscale = 0.2\n"
@@ -104,16 +116,11 @@ def test_the_shipped_curves_are_those_of_the_model(name: str, bars: int, slip: b
 
 @with_opensees
 def test_a_model_without_equilibrium_ends_the_test_with_one_sentence(tmp_path: Path) -> None:
-    (tmp_path / "rod.py").write_text(
-        "def build(ops):\n"
-        "    ops.model('basic', '-ndm', 1, '-ndf', 1)\n"
-        "    ops.node(1, 0.0)\n    ops.node(2, 1.0)\n    ops.fix(1, 1)\n"
-        "    ops.uniaxialMaterial('Elastic', 1, 1e6)\n"
-        "    ops.element('Truss', 1, 1, 2, 1.0, 1)\n"
-        "    analyze = ops.analyze\n"
-        "    ops.analyze = lambda steps: analyze(steps) if ops.nodeDisp(2, 1) < 1e-3 else -3\n"
-        "    return 2, 1\n"
+    limited = "    analyze = ops.analyze\n"
+    limited += (
+        "    ops.analyze = lambda steps: analyze(steps) if ops.nodeDisp(2, 1) < 1e-3 else -3\n    return"
     )
+    (tmp_path / "rod.py").write_text(ROD.replace("    return", limited))
     column = SpecimenProcess("'rod.py'", {"model": str(tmp_path / "rod.py"), "options": {}})
     try:
         assert column.force([5e-4]) == pytest.approx(500.0)
@@ -137,13 +144,55 @@ def test_a_dead_opensees_process_ends_the_test_with_one_sentence() -> None:
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"materials": [["Stele02", 1, 1.0]]}, "OpenSees cannot be the specimen 'Stele02'"),
-        ({"file": str(EXAMPLES / "steel02.toml")}, "OpenSees cannot be the specimen"),
+        (
+            {"materials": [["Stele02", 1, 1.0]]},
+            "specimen 'Stele02' \\(WARNING material type Stele02 is unknown\\)",
+        ),
+        (
+            {"materials": [["Steel02", 1, 25e3]]},
+            "specimen 'Steel02' \\(Invalid #args, want: uniaxialMaterial Steel02",
+        ),
+        (
+            {"file": str(EXAMPLES / "steel02.toml")},
+            "OpenSees cannot be the specimen .* \\(line 17: SyntaxError",
+        ),
     ],
 )
 def test_a_material_that_opensees_refuses_is_reported(options: dict[str, Any], text: str) -> None:
     with pytest.raises(InputError, match=text):
         Specimen(0.002, 1, **options)
+
+
+@with_opensees
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("x = 1\n", "it has no function build(ops, **options)"),
+        ("def build(ops):\n    return 3\n", "build returns 3, but must return a node and a direction"),
+        (ROD.replace("    ops.element", "    0 and ops.element"), "build makes no element"),
+        (ROD.replace("return 2, 1", "return 3, 1"), "build returns node 3, which is not in the model"),
+        (
+            ROD.replace("return 2, 1", "return 2, 2"),
+            "build returns direction 2, but must return one from 1 to 1",
+        ),
+    ],
+)
+def test_a_file_that_makes_no_specimen_is_refused_with_the_reason(
+    text: str, says: str, tmp_path: Path
+) -> None:
+    (tmp_path / "rod.py").write_text(text)
+    with pytest.raises(InputError) as told:
+        Specimen(0.002, 1, file=str(tmp_path / "rod.py"))
+    assert str(told.value) == f"OpenSees cannot be the specimen '{tmp_path}/rod.py' ({says})."
+
+
+@with_opensees
+def test_a_material_without_a_force_is_reported() -> None:
+    rig = Specimen(0.002, 1, materials=[["Elastic", 1, float("nan")]])
+    with pytest.raises(RigError) as told:
+        rig.arm()
+    assert str(told.value) == "OpenSees finds no force of 'Elastic' at 0 mm: correct its row in materials."
+    rig.disarm()
 
 
 def test_an_interpreter_without_openseespy_gives_one_sentence_with_the_remedy(

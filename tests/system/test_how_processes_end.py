@@ -247,3 +247,19 @@ def test_a_folder_without_permission_gives_exit_code_2(tmp_path: Path) -> None:
     assert code == 2
     assert "Cannot create the folder runs" in err
     assert "Traceback" not in err
+
+
+@pytest.mark.slow
+def test_a_rig_that_cannot_be_constructed_leaves_no_recording(tmp_path: Path) -> None:
+    path = tmp_path / "none.mcap"
+    (tmp_path / "lab.py").write_text(
+        "class Lab:\n    def __init__(self, interval, seed):\n        raise RuntimeError('no card')\n"
+        "    def arm(self): pass\n    def read(self): return 0.0, 0.0\n"
+        "    def write(self, command): pass\n    def disarm(self): pass\n"
+    )
+    plan = tmp_path / "own.toml"
+    plan.write_text('[test]\nname = "own"\n[slave]\nkind = "none"\n[master.rig]\nclass = "lab.py:Lab"\n')
+    code, _, err = finish(start("run", plan, "--duration", "2", "-o", path))
+    assert code == 2, err
+    assert err.splitlines()[-1].endswith("RuntimeError: no card (lab.py, line 3).")
+    assert not path.exists()
