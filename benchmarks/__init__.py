@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from benchmarks import (
+    catalogue,
     closed_loop,
     codec,
     exchange,
@@ -36,6 +37,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "exchange": exchange.run,
     "real_time": real_time.run,
     "live": live.run,
+    "catalogue": catalogue.run,
     "closed_loop": closed_loop.run,
     "virtual": virtual_time.run,
     "scale": scale.run,

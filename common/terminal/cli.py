@@ -14,9 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from common.errors import InputError, RthsError
-from common.host import realtime
 from common.reporting import Report
-from common.safety import risks
 from common.terminal.plain_report import PlainReport, plain, say
 from common.terminal.printable import escaping, shown
 
@@ -105,6 +103,8 @@ def connect_argument(parser: argparse.ArgumentParser) -> None:
 
 def rt_arguments(parser: argparse.ArgumentParser) -> None:
     """The option for the real-time mode of a laboratory's process."""
+    from common.host import realtime
+
     parser.add_argument(
         "--rt",
         choices=realtime.MODES,
@@ -165,6 +165,8 @@ def force_argument(parser: argparse.ArgumentParser) -> None:
 
 def accept_argument(parser: argparse.ArgumentParser) -> None:
     """The option that accepts a risk by its name; `accepted_risks` reads it."""
+    from common.safety import risks
+
     parser.add_argument(
         "--accept-risk",
         action="append",
@@ -184,6 +186,8 @@ def await_start_argument(parser: argparse.ArgumentParser) -> None:
 
 def accepted_risks(args: argparse.Namespace) -> tuple[str, ...]:
     """The names of the risks that the command line accepts; raises InputError for an unknown name."""
+    from common.safety import risks
+
     return risks.known(args.accept_risk)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 import shutil
 import stat
 import sys
@@ -106,7 +105,7 @@ def writing(path: Path, force: bool = False, inputs: Iterable[Path] = ()) -> Ite
     stream = is_stream(path)
     place = target(path)
     folder = Path(tempfile.gettempdir()) if stream else place.parent
-    temporary = folder / f".rths-{secrets.token_hex(8)}{path.suffix}"
+    temporary = folder / f".rths-{os.urandom(8).hex()}{path.suffix}"
     try:
         os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, MODE))
         yield temporary

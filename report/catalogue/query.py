@@ -14,7 +14,6 @@ import sqlite3
 from typing import NamedTuple
 
 from common.errors import InputError
-from common.plan.schema import nearest
 from common.plan.units import in_si
 from report.catalogue.columns import BY_NAME, CatalogueColumn
 from report.catalogue.store import escaped
@@ -123,7 +122,7 @@ class ConditionParser:
         """A comparison of a column."""
         column = BY_NAME.get(name)
         if column is None:
-            raise InputError(f"The catalogue has no column '{name}': {nearest(name, [*BY_NAME, 'peak'])}")
+            raise InputError(f"The catalogue has no column '{name}': {suggested(name, [*BY_NAME, 'peak'])}")
         operator = self.operator(name)
         if column.unit is None:
             return of_text(column, operator, unquoted(" ".join(self.value(name))))
@@ -136,7 +135,7 @@ class ConditionParser:
         found = self._base.execute("SELECT unit FROM peaks WHERE name = ? LIMIT 1", (name,)).fetchone()
         if found is None:
             known = [row[0] for row in self._base.execute("SELECT DISTINCT name FROM peaks")]
-            hint = nearest(name, known) if known else "no recording has peaks."
+            hint = suggested(name, known) if known else "no recording has peaks."
             raise InputError(f"No recording of the catalogue has a signal '{name}': {hint}")
         operator = self.operator(f"peak {name}")
         number = of_number(" ".join(self.value(f"peak {name}")), operator, found[0], f"peak {name}")
@@ -158,6 +157,13 @@ class ConditionParser:
         if not found:
             raise InputError(f"A value is missing behind {name}: write a condition {EXAMPLE}.")
         return found
+
+
+def suggested(name: str, known: list[str]) -> str:
+    """What a name may have been meant to be."""
+    from common.plan.schema import nearest  # which takes longer to load than a question to answer
+
+    return nearest(name, known)
 
 
 def of_text(column: CatalogueColumn, operator: str, text: str) -> Condition:

@@ -15,8 +15,9 @@ from report.catalogue.columns import NAMES, notes_of
 from report.catalogue.entry import CatalogueEntry
 from simulation.workers.pool import spread
 
-# Recordings from which on several processes read sooner than one: their start takes as long as some forty recordings.
-FEW = 40
+# Recordings from which on several processes read sooner than one: their start takes as long as reading some eighty
+# recordings of 40 s, and two of them save half of the reading.
+FEW = 160
 LARGEST_REPORT = (
     16 << 20
 )  # bytes of a JSON file that is looked into; a diagnosis report has some hundred thousand
@@ -60,7 +61,7 @@ def entries(paths: Sequence[Path], home: Path, tell: Tell) -> list[CatalogueEntr
     read = []
     for one in spread(partial(entry.entry, folder=home), paths, -1 if len(paths) > FEW else 1):
         read.append(one)
-        tell("cataloguing", len(read), len(paths))
+        tell("recordings", len(read), len(paths))
     return sorted(read, key=lambda one: str(one.facts["file"]))
 
 

@@ -13,11 +13,6 @@ from report.catalogue.columns import COLUMNS, NAMES, Facts, Peak
 NAME = "catalog.sqlite"
 TABLES = ("recordings", "peaks", "stamps")
 VERSION = 1  # of the tables; a file of another version is created again
-# Threads that read at once: checksums and unpacking, two thirds of the work, run outside Python's lock.
-READERS = 4
-LARGEST_REPORT = (
-    16 << 20
-)  # bytes of a JSON file that is looked into; a diagnosis report has some hundred thousand
 
 
 @contextlib.contextmanager
@@ -33,13 +28,14 @@ def opened(path: Path, *, create: bool = False) -> Iterator[sqlite3.Connection]:
         with contextlib.closing(
             sqlite3.connect(path if create else f"file:{path}?mode=ro", uri=not create)
         ) as base:
-            if base.execute("PRAGMA user_version").fetchone()[0] != VERSION:
-                if not create:
-                    raise InputError(
-                        f"{path} is of another version: renew it with rths catalog {path.parent}."
-                    )
-                made(base)
             with base:
+                base.execute("BEGIN IMMEDIATE" if create else "BEGIN")
+                if base.execute("PRAGMA user_version").fetchone()[0] != VERSION:
+                    if not create:
+                        raise InputError(
+                            f"{path} is not whole or of another version: renew it with rths catalog {path.parent}."
+                        )
+                    made(base)
                 yield base
     except sqlite3.Error as error:
         raise InputError(
