@@ -25,18 +25,20 @@ def opened(path: Path, *, create: bool = False) -> Iterator[sqlite3.Connection]:
     if not create and not path.exists():
         raise InputError(f"There is no catalogue {path}: make it with rths catalog {path.parent}.")
     try:
-        with contextlib.closing(
-            sqlite3.connect(path if create else f"file:{path}?mode=ro", uri=not create)
-        ) as base:
-            with base:
-                base.execute("BEGIN IMMEDIATE" if create else "BEGIN")
-                if base.execute("PRAGMA user_version").fetchone()[0] != VERSION:
-                    if not create:
-                        raise InputError(
-                            f"{path} is not whole or of another version: renew it with rths catalog {path.parent}."
-                        )
-                    made(base)
-                yield base
+        with (
+            contextlib.closing(
+                sqlite3.connect(path if create else f"file:{path}?mode=ro", uri=not create)
+            ) as base,
+            base,
+        ):
+            base.execute("BEGIN IMMEDIATE" if create else "BEGIN")
+            if base.execute("PRAGMA user_version").fetchone()[0] != VERSION:
+                if not create:
+                    raise InputError(
+                        f"{path} is not whole or of another version: renew it with rths catalog {path.parent}."
+                    )
+                made(base)
+            yield base
     except sqlite3.Error as error:
         raise InputError(
             f"Cannot use the catalogue {path}: {error}; if it is damaged, delete it and make it anew."
