@@ -81,6 +81,10 @@ class TableEffects:
     oil_damping: float = 0.1
     compliance: float = 0.0  # m/N
     backlash: float = 0.0  # m, whole play
+    backlash_law: float = 0.0  # 0 before the loop, 1 between loop and platform
+    flank_frequency: float = 100.0  # Hz, of the platform on the flanks of the play of law 1
+    flank_damping: float = 0.5  # ratio there
+    guide: float = 0.0  # 1/s, at which the platform takes the loop's velocity inside the play
     friction: float = 0.0  # m/s²: force over moving mass
     friction_velocity: float = 1e-6  # m/s, as in `ColumnEffects`
     friction_asymmetry: float = 0.0  # share more in the positive direction, and less in the other

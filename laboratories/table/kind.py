@@ -22,7 +22,7 @@ from laboratories.kind import (
     Pictured,
     Sensed,
 )
-from laboratories.table import model
+from laboratories.table import linear, model
 from laboratories.table.descent import TableRamp
 from laboratories.table.model import TableLab
 from models.compiled import bound
@@ -78,7 +78,7 @@ class TableKind(Kind):
 
     def resume(self, lab: TableLab, truth: Array, motion: float, rate: float) -> None:
         """Set the damper's stroke (m) and its rate (m/s)."""
-        lab.state[model.STROKE], lab.state[model.STROKE_RATE] = motion, rate
+        lab.state[linear.STROKE], lab.state[linear.STROKE_RATE] = motion, rate
         truth[self.channels.names.index(self.free)] = motion
 
     def drifts(self, plan: Plan) -> bool:

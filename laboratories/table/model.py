@@ -11,23 +11,31 @@ friction of a segment is the force that stops the motion within it, up to its si
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from common.errors import InputError
 from common.plan.laboratory_tables import Damper, ShakingTable
 from laboratories.column.model import substeps
+from laboratories.table.linear import (
+    ACCELERATION,
+    BASE,
+    BASE_RATE,
+    BEHIND_LOOP,
+    INPUTS,
+    MOTOR,
+    STROKE,
+    STROKE_RATE,
+    TABLE,
+    TABLE_RATE,
+    propagation,
+)
 from models import friction, preisach
 from models.compiled import jit
 from models.registry import Array
 from models.system import DamperEffects, TableEffects
 from models.transfer_systems import delay
-
-TABLE, TABLE_RATE, STROKE, STROKE_RATE, MOTOR, ACCELERATION = range(6)
-BASE, BASE_RATE = 6, 7  # the table below an oil column's resonance, where there is one
-RAMP, PUSH, RAIL, DRAG = range(4)  # inputs: table command, motor force N, force g N, table friction m/s²
-INPUTS = 5  # columns behind the states: command before and after, motor command, g, table friction
 
 # places in `limits`
 PRESENT, TABLE_GAIN, PLAY, TABLE_FRICTION, MOTOR_GAIN, FORCE_LIMIT, FRICTION, STOP, STOP_STIFFNESS = range(9)
@@ -36,6 +44,8 @@ OFFSET = 12
 IDEAL = 11  # interval (s) of a table that follows at once, 0 for any other
 TABLE_SHAPE, SHAPE = 13, 16  # of the frictions: asymmetry, what speed takes of them, and that speed
 PRESLIDING = 19  # m, of the rail's friction
+# of the play behind the loop: a half of it m, drag of the guide 1/s, 2ζ/ω of the flanks s, 1/ω² of them s²
+BEHIND, GUIDE, DAMPED, SOFT = 20, 21, 22, 23
 
 # places in `scratch` behind the states and inputs
 PLAYED, LAST_VELOCITY, BRISTLES = range(3)
@@ -77,6 +87,10 @@ def build(
         InputError: an ideal table is given compliance, friction or an oil column.
     """
     on_table, on_damper = table_effects or TableEffects(), damper_effects or DamperEffects()
+    if on_table.backlash_law == BEHIND_LOOP and math.isinf(on_table.oil_frequency):
+        on_table = replace(
+            on_table, oil_frequency=on_table.flank_frequency, oil_damping=on_table.flank_damping
+        )
     present = on_table != TableEffects() or on_damper != DamperEffects()
     short = on_table.backlash or on_table.friction or on_damper.friction or on_damper.stop_stiffness
     law, braked = np.array(on_damper.learned), np.array(on_table.learned)
@@ -88,13 +102,14 @@ def build(
             alike[key] = propagation(float(length), table, damper, on_table)
     matrices = np.stack([alike[round(float(length), 12)] for length in segments.lengths])
     size = matrices.shape[1]
-    limits = [float(present), on_table.gain, on_table.backlash, on_table.friction, on_damper.gain]
+    before, behind = plays(on_table)
+    limits = [float(present), on_table.gain, before, on_table.friction, on_damper.gain]
     limits += [on_damper.force_limit, on_damper.friction, on_damper.stop_stroke, on_damper.stop_stiffness]
     limits += [on_table.friction_velocity, on_damper.friction_velocity]
     limits += [interval if math.isinf(table.frequency) else 0.0, on_damper.offset]
     for part in (on_table, on_damper):
         limits += [part.friction_asymmetry, part.friction_drop, part.friction_speed]
-    limits += [on_damper.presliding]
+    limits += [on_damper.presliding, *behind]
     return TableLab(
         segments.taps,
         matrices,
@@ -111,17 +126,12 @@ def build(
     )
 
 
-def propagation(length: float, table: ShakingTable, damper: Damper, effects: TableEffects) -> Array:
-    """Propagation over one segment; shape (n, n + 5)."""
-    if not math.isinf(table.frequency):
-        return lagging_matrix(length, table, damper, effects)
-    nulls = {"compliance": 0.0, "friction": 0.0, "oil_frequency": math.inf, "learned": ()}
-    for name, null in nulls.items():
-        if getattr(effects, name) != null:
-            raise InputError(
-                f"An ideal table (frequency inf) cannot have the effect '{name}': leave it out, or give a frequency."
-            )
-    return ideal_matrix(length, damper)
+def plays(effects: TableEffects) -> tuple[float, tuple[float, float, float, float]]:
+    """The play before the loop (m), and what `limits` holds of that behind it from place `BEHIND` on."""
+    if effects.backlash_law != BEHIND_LOOP:
+        return effects.backlash, (0.0, 0.0, 0.0, 0.0)
+    omega = 2.0 * math.pi * effects.oil_frequency
+    return 0.0, (0.5 * effects.backlash, effects.guide, 2.0 * effects.oil_damping / omega, 1.0 / omega**2)
 
 
 @jit
@@ -142,7 +152,7 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
     before, after, motor, rail, drag = size, size + 1, size + 2, size + 3, size + 4
     played, last = size + INPUTS + PLAYED, size + INPUTS + LAST_VELOCITY
     start = state[TABLE]
-    present = limits[PRESENT] != 0.0
+    present, apart = limits[PRESENT] != 0.0, 0.0
     scratch[motor] = motor_command
     scratch[rail] = 0.0
     scratch[drag] = 0.0
@@ -166,17 +176,52 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
                 scratch[played] = min(max(scratch[played], wanted - half), wanted + half)
                 scratch[after] = scratch[played]
             resist(matrices[i], lab, scratch, lab.lengths[i])
+            apart = within_play(matrices[i], limits, scratch, lab.lengths[i])
+            scratch[TABLE] += apart  # the platform as it would be on its spring without play
         for row in range(size):
             value = 0.0
             for column in range(size + INPUTS):
                 value += matrices[i, row, column] * scratch[column]
             state[row] = value
+        put_back(limits, state, apart)
     if limits[IDEAL] > 0.0:  # its velocity has steps, so the acceleration is the mean over the interval
         velocity = (state[TABLE] - start) / limits[IDEAL]
         state[ACCELERATION] = (velocity - scratch[last]) / limits[IDEAL]
         scratch[last] = velocity
     force = spring[0] * state[STROKE] + spring[1] * state[STROKE_RATE] + scratch[rail] - state[MOTOR]
     return state[TABLE], state[ACCELERATION], state[STROKE], force
+
+
+@jit
+def within_play(matrix: Array, limits: Array, scratch: Array, length: float) -> float:
+    """How far (m) the loop is ahead of the platform when their spring is at rest, at the middle of a segment.
+
+    In contact it is half the play. Within the play it is such that the spring and its damping together leave the drag
+    of the guide.
+    """
+    half, guide = limits[BEHIND], limits[GUIDE]
+    if half == 0.0:
+        return 0.0
+    speed = scratch[BASE_RATE] - scratch[TABLE_RATE]
+    end = free_rate(matrix, scratch, BASE_RATE) - scratch[TABLE_RATE] - guide * length * speed
+    middle = 0.5 * (speed + end)
+    ahead = scratch[BASE] - scratch[TABLE] + 0.25 * length * (speed + middle)
+    if abs(ahead) > half:
+        return half if ahead > 0.0 else -half
+    return float(ahead + (limits[DAMPED] - limits[SOFT] * guide) * middle)
+
+
+@jit
+def put_back(limits: Array, state: Array, apart: float) -> None:
+    """Put the platform back to its own place (m) after a segment, and read its acceleration (m/s²) where it is free.
+
+    There the spring of the matrix, whose force is none on the mean of the segment, has one at its end.
+    """
+    if limits[BEHIND] == 0.0:
+        return
+    state[TABLE] -= apart
+    if abs(apart) != limits[BEHIND]:
+        state[ACCELERATION] = limits[GUIDE] * (state[BASE_RATE] - state[TABLE_RATE])
 
 
 @jit
@@ -254,104 +299,3 @@ def bent(matrix: Array, scratch: Array, length: float, least: float, most: float
         left = np.exp(-moved / presliding)
         moved -= (moved - far + lost * (1.0 - left)) / (1.0 + lost / presliding * left)
     return friction.dahl(force, moved if ahead > 0.0 else -moved, least, most, presliding)
-
-
-def damper_rows(a: Array, b: Array, damper: Damper) -> None:
-    """Fill the damper's and the motor's rows of the rate matrices, the table's acceleration left out."""
-    a[STROKE, STROKE_RATE] = 1.0
-    a[STROKE_RATE, STROKE] = -damper.stiffness / damper.mass
-    a[STROKE_RATE, STROKE_RATE] = -damper.damping / damper.mass
-    b[STROKE_RATE, RAIL] = -1.0 / damper.mass
-    if damper.motor_time_constant == 0.0:
-        b[STROKE_RATE, PUSH] = 1.0 / damper.mass
-    else:
-        a[STROKE_RATE, MOTOR] = 1.0 / damper.mass
-        a[MOTOR, MOTOR] = -1.0 / damper.motor_time_constant
-        b[MOTOR, PUSH] = 1.0 / damper.motor_time_constant
-
-
-def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: TableEffects) -> Array:
-    """Propagation over one segment of `length` s for a table of second order; shape (n, n + 5).
-
-    Under the damper's force F the table gives way as if its command were changed by compliance·F.
-    With an oil column the platform follows the table below it as a second oscillator.
-    """
-    size = 6 if math.isinf(effects.oil_frequency) else 8
-    place, rate = (TABLE, TABLE_RATE) if size == 6 else (BASE, BASE_RATE)
-    omega = 2.0 * math.pi * table.frequency
-    a, b = np.zeros((size, size)), np.zeros((size, 4))
-    a[place, rate] = 1.0
-    a[rate, place], a[rate, rate] = -(omega**2), -2.0 * table.damping_ratio * omega
-    b[rate, RAMP], b[rate, DRAG] = omega**2, 1.0
-    yielding = effects.compliance * omega**2
-    a[rate, STROKE] += yielding * damper.stiffness
-    a[rate, STROKE_RATE] += yielding * damper.damping
-    b[rate, RAIL] += yielding
-    if damper.motor_time_constant == 0.0:
-        b[rate, PUSH] -= yielding
-    else:
-        a[rate, MOTOR] -= yielding
-    if size == 8:
-        oil = 2.0 * math.pi * effects.oil_frequency
-        a[TABLE, TABLE_RATE] = 1.0
-        a[TABLE_RATE, TABLE], a[TABLE_RATE, TABLE_RATE] = -(oil**2), -2.0 * effects.oil_damping * oil
-        a[TABLE_RATE, BASE] = oil**2
-    damper_rows(a, b, damper)
-    a[STROKE_RATE] -= a[TABLE_RATE]
-    b[STROKE_RATE] -= b[TABLE_RATE]
-    result = propagate_ramp(a, b, length, damper)
-    result[ACCELERATION] = a[TABLE_RATE] @ result
-    result[ACCELERATION, size + 1] += b[TABLE_RATE, RAMP]
-    if damper.motor_time_constant == 0.0:
-        result[ACCELERATION, size + 2] += b[TABLE_RATE, PUSH]
-    result[ACCELERATION, size + 3] += b[TABLE_RATE, RAIL]
-    result[ACCELERATION, size + 4] += b[TABLE_RATE, DRAG]
-    return result
-
-
-def ideal_matrix(length: float, damper: Damper) -> Array:
-    """Propagation over one segment of `length` s for a table that follows its ramped command at once; shape (6, 11).
-
-    The table's velocity is constant over a segment and steps at its beginning, which steps the stroke's
-    velocity the other way; the acceleration is that step over the segment's length.
-    """
-    size = 6
-    a, b = np.zeros((size, size)), np.zeros((size, 4))
-    damper_rows(a, b, damper)
-    width = size + INPUTS
-    slope = np.zeros(width)
-    slope[size], slope[size + 1] = -1.0 / length, 1.0 / length
-    step = np.eye(width)
-    step[STROKE_RATE] += step[TABLE_RATE] - slope
-    result: Array = propagate_ramp(a, b, length, damper) @ step
-    result[TABLE] = np.eye(width)[size + 1]
-    result[TABLE_RATE] = slope
-    result[ACCELERATION] = (slope - np.eye(width)[TABLE_RATE]) / length
-    return result
-
-
-def propagate_ramp(a: Array, b: Array, length: float, damper: Damper) -> Array:
-    """Exact propagation of `ż = a·z + b·(v, F, g, d)` with v moving from v0 to v1 and the others held.
-
-    By one matrix exponential with the inputs as further states (Van Loan 1978); shape (n, n + 5). A motor
-    without lag has its command as its force. The row of the acceleration is left zero.
-    """
-    from scipy.linalg import expm
-
-    size = a.shape[0]
-    big = np.zeros((size + 5, size + 5))
-    big[:size, :size] = a
-    big[:size, size] = b[:, RAMP]
-    big[size, size + 1] = 1.0 / length
-    big[:size, size + 2 :] = b[:, PUSH:]
-    whole = expm(big * length)
-    result = np.zeros((size, size + INPUTS))
-    result[:, :size] = whole[:size, :size]
-    result[:, ACCELERATION] = 0.0
-    result[ACCELERATION] = 0.0
-    result[:, size] = whole[:size, size] - whole[:size, size + 1]
-    result[:, size + 1] = whole[:size, size + 1]
-    result[:, size + 2 :] = whole[:size, size + 2 :]
-    if damper.motor_time_constant == 0.0:
-        result[MOTOR] = np.eye(size + INPUTS)[size + 2]
-    return result

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from common.plan.laboratory_tables import Actuator, Column, Damper, ShakingTable
 from laboratories.column import model as column_lab
+from laboratories.table import linear
 from laboratories.table import model as table_lab
 from models.system import ActuatorEffects, ColumnEffects, DamperEffects, TableEffects
 
@@ -71,7 +72,7 @@ def run_b(
     rows = []
     for value, push in zip(command.tolist(), pushes.tolist(), strict=True):
         result = table_lab.advance(lab, value, push)
-        rows.append((*result, lab.state[table_lab.TABLE_RATE], lab.state[table_lab.STROKE_RATE]))
+        rows.append((*result, lab.state[linear.TABLE_RATE], lab.state[linear.STROKE_RATE]))
     return np.array(rows)
 
 

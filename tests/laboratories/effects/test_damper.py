@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp, trapezoid
 from common.plan.laboratory_tables import Damper, ShakingTable
 from common.plan.plan import Plan
 from laboratories.effects import lay
+from laboratories.table import linear
 from laboratories.table import model as table_lab
 from models.system import DamperEffects, System, TableEffects
 from tests.laboratories.effects.histories import (
@@ -36,11 +37,11 @@ def released(
 ) -> Array:
     """Stroke, its velocity and the force of a damper let go on a standing table, at every tick."""
     lab = table_lab.build(DT, ShakingTable(), damper, None, effects)
-    lab.state[table_lab.STROKE], lab.state[table_lab.STROKE_RATE] = stroke, rate
+    lab.state[linear.STROKE], lab.state[linear.STROKE_RATE] = stroke, rate
     rows = []
     for _ in range(round(seconds / DT)):
         _, _, s, force = table_lab.advance(lab, 0.0, 0.0)
-        rows.append((s, lab.state[table_lab.STROKE_RATE], force))
+        rows.append((s, lab.state[linear.STROKE_RATE], force))
     return np.array(rows)
 
 

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp, trapezoid
 
 from common.errors import InputError
 from common.plan.laboratory_tables import Damper, ShakingTable
+from laboratories.table import linear
 from laboratories.table import model as table_lab
 from models import preisach
 from models.system import TableEffects
@@ -56,6 +57,50 @@ def test_gain_and_oil_column_have_their_transfer_functions(
     found = phasor(got[:, Y], t, frequency, 4.0)
     assert abs(found - expected) < 2e-3 * abs(expected)
     assert phasor(got[:, ACCELERATION], t, frequency, 4.0) == pytest.approx(s**2 * found, rel=2e-2)
+
+
+QUICK = ShakingTable(delay=0.0, frequency=2000.0)  # its loop follows the command
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_platform_with_play_behind_the_loop_bounces_off_its_flank(direction: float) -> None:
+    """A spring and dashpot take it along by V·(1 + exp(−ζπ/√(1 − ζ²))), V the speed of the loop."""
+    speed, half, frequency, damping = 0.1 * direction, 2e-3, 50.0, 0.2
+    t = np.arange(1, 241) * SHORT
+    more = TableEffects(
+        backlash=2.0 * half, backlash_law=1.0, flank_frequency=frequency, flank_damping=damping
+    )
+    got = run_b(speed * t, table=QUICK, damper=STILL, table_effects=more, interval=SHORT)
+    met = half / abs(speed)
+    # the loop's velocity has a step at first, of which a short segment sees a part
+    assert np.max(np.abs(got[t < met - 5e-4, Y])) < 5e-3 * half
+    kept = math.exp(-damping * math.pi / math.sqrt(1.0 - damping**2))
+    late = t > met + 0.5 / (frequency * math.sqrt(1.0 - damping**2)) + 1e-3
+    np.testing.assert_allclose(got[late, RATE], speed * (1.0 + kept), rtol=0.02)
+    assert np.max(np.abs(got[late, ACCELERATION])) < 5e-3 * 2.0 * math.pi * frequency * abs(speed)
+
+
+def test_a_guide_drags_the_platform_along_inside_its_play() -> None:
+    """ẏ = V·(1 − exp(−guide·t)) under a loop of constant speed V."""
+    speed, guide = 0.05, 40.0
+    t = np.arange(1, 201) * SHORT
+    more = TableEffects(backlash=0.02, backlash_law=1.0, guide=guide)
+    got = run_b(speed * t, table=QUICK, damper=STILL, table_effects=more, interval=SHORT)
+    np.testing.assert_allclose(got[:, RATE], speed * -np.expm1(-guide * t), atol=0.02 * speed)
+
+
+def test_a_play_of_nothing_behind_the_loop_leaves_the_resonance_of_its_flanks() -> None:
+    drive, flanks, damping = 5.0, 20.0, 0.3
+    t = np.arange(1, 8001) * SHORT
+    more = TableEffects(backlash=1e-12, backlash_law=1.0, flank_frequency=flanks, flank_damping=damping)
+    command = 5e-3 * np.sin(2.0 * np.pi * drive * t)
+    got = run_b(command, table=QUICK, damper=STILL, table_effects=more, interval=SHORT)
+    omega, s = 2.0 * math.pi * flanks, 2j * math.pi * drive
+    passed = (2.0 * damping * omega * s + omega**2) / (s**2 + 2.0 * damping * omega * s + omega**2)
+    expected = 5e-3 * passed * second_order(s, QUICK.frequency, QUICK.damping_ratio)
+    late = t > 1.0
+    wave = np.exp(s * t)
+    assert np.max(np.abs(got[:, Y] - (expected * wave).imag)[late]) < 2e-3 * abs(expected)
 
 
 @pytest.mark.parametrize("compliance", [6e-6, 2.5e-5])
@@ -142,9 +187,7 @@ def test_table_friction_dissipates_force_times_distance(oil: float) -> None:
     table = ShakingTable(delay=0.0)
     more = TableEffects(friction=friction, oil_frequency=oil)
     lab = table_lab.build(SHORT, table, STILL, more)
-    place, rate = (
-        (table_lab.TABLE, table_lab.TABLE_RATE) if math.isinf(oil) else (table_lab.BASE, table_lab.BASE_RATE)
-    )
+    place, rate = (linear.TABLE, linear.TABLE_RATE) if math.isinf(oil) else (linear.BASE, linear.BASE_RATE)
     states = []
     for value in command.tolist():
         table_lab.advance(lab, value, 0.0)

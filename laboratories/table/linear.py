@@ -1,0 +1,140 @@
+"""The linear part of table, damper and motor: its states and inputs, and the matrices that propagate it exactly."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from common.errors import InputError
+from common.plan.laboratory_tables import Damper, ShakingTable
+from models.registry import Array
+from models.system import TableEffects
+
+TABLE, TABLE_RATE, STROKE, STROKE_RATE, MOTOR, ACCELERATION = range(6)
+BASE, BASE_RATE = 6, 7  # the table below an oil column's resonance, where there is one
+RAMP, PUSH, RAIL, DRAG = range(4)  # inputs: table command, motor force N, force g N, table friction m/s²
+BEHIND_LOOP = 1.0  # the law of `table.backlash` with the play between loop and platform
+INPUTS = 5  # columns behind the states: command before and after, motor command, g, table friction
+
+
+def propagation(length: float, table: ShakingTable, damper: Damper, effects: TableEffects) -> Array:
+    """Propagation over one segment; shape (n, n + 5)."""
+    if not math.isinf(table.frequency):
+        return lagging_matrix(length, table, damper, effects)
+    nulls = {
+        "backlash_law": 0.0,
+        "compliance": 0.0,
+        "friction": 0.0,
+        "oil_frequency": math.inf,
+        "learned": (),
+    }
+    for name, null in nulls.items():
+        if getattr(effects, name) != null:
+            raise InputError(
+                f"An ideal table (frequency inf) cannot have the effect '{name}': leave it out, or give a frequency."
+            )
+    return ideal_matrix(length, damper)
+
+
+def damper_rows(a: Array, b: Array, damper: Damper) -> None:
+    """Fill the damper's and the motor's rows of the rate matrices, the table's acceleration left out."""
+    a[STROKE, STROKE_RATE] = 1.0
+    a[STROKE_RATE, STROKE] = -damper.stiffness / damper.mass
+    a[STROKE_RATE, STROKE_RATE] = -damper.damping / damper.mass
+    b[STROKE_RATE, RAIL] = -1.0 / damper.mass
+    if damper.motor_time_constant == 0.0:
+        b[STROKE_RATE, PUSH] = 1.0 / damper.mass
+    else:
+        a[STROKE_RATE, MOTOR] = 1.0 / damper.mass
+        a[MOTOR, MOTOR] = -1.0 / damper.motor_time_constant
+        b[MOTOR, PUSH] = 1.0 / damper.motor_time_constant
+
+
+def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: TableEffects) -> Array:
+    """Propagation over one segment of `length` s for a table of second order; shape (n, n + 5).
+
+    Under the damper's force F the table gives way as if its command were changed by compliance·F.
+    With an oil column the platform follows the table below it as a second oscillator.
+    """
+    size = 6 if math.isinf(effects.oil_frequency) else 8
+    place, rate = (TABLE, TABLE_RATE) if size == 6 else (BASE, BASE_RATE)
+    omega = 2.0 * math.pi * table.frequency
+    a, b = np.zeros((size, size)), np.zeros((size, 4))
+    a[place, rate] = 1.0
+    a[rate, place], a[rate, rate] = -(omega**2), -2.0 * table.damping_ratio * omega
+    b[rate, RAMP], b[rate, DRAG] = omega**2, 1.0
+    yielding = effects.compliance * omega**2
+    a[rate, STROKE] += yielding * damper.stiffness
+    a[rate, STROKE_RATE] += yielding * damper.damping
+    b[rate, RAIL] += yielding
+    if damper.motor_time_constant == 0.0:
+        b[rate, PUSH] -= yielding
+    else:
+        a[rate, MOTOR] -= yielding
+    if size == 8:
+        oil = 2.0 * math.pi * effects.oil_frequency
+        a[TABLE, TABLE_RATE] = 1.0
+        a[TABLE_RATE, TABLE], a[TABLE_RATE, TABLE_RATE] = -(oil**2), -2.0 * effects.oil_damping * oil
+        a[TABLE_RATE, BASE] = oil**2
+        if effects.backlash_law == BEHIND_LOOP:  # dashpots of flanks are between the two
+            a[TABLE_RATE, BASE_RATE] = 2.0 * effects.oil_damping * oil
+    damper_rows(a, b, damper)
+    a[STROKE_RATE] -= a[TABLE_RATE]
+    b[STROKE_RATE] -= b[TABLE_RATE]
+    result = propagate_ramp(a, b, length, damper)
+    result[ACCELERATION] = a[TABLE_RATE] @ result
+    result[ACCELERATION, size + 1] += b[TABLE_RATE, RAMP]
+    if damper.motor_time_constant == 0.0:
+        result[ACCELERATION, size + 2] += b[TABLE_RATE, PUSH]
+    result[ACCELERATION, size + 3] += b[TABLE_RATE, RAIL]
+    result[ACCELERATION, size + 4] += b[TABLE_RATE, DRAG]
+    return result
+
+
+def ideal_matrix(length: float, damper: Damper) -> Array:
+    """Propagation over one segment of `length` s for a table that follows its ramped command at once; shape (6, 11).
+
+    The table's velocity is constant over a segment and steps at its beginning, which steps the stroke's
+    velocity the other way; the acceleration is that step over the segment's length.
+    """
+    size = 6
+    a, b = np.zeros((size, size)), np.zeros((size, 4))
+    damper_rows(a, b, damper)
+    width = size + INPUTS
+    slope = np.zeros(width)
+    slope[size], slope[size + 1] = -1.0 / length, 1.0 / length
+    step = np.eye(width)
+    step[STROKE_RATE] += step[TABLE_RATE] - slope
+    result: Array = propagate_ramp(a, b, length, damper) @ step
+    result[TABLE] = np.eye(width)[size + 1]
+    result[TABLE_RATE] = slope
+    result[ACCELERATION] = (slope - np.eye(width)[TABLE_RATE]) / length
+    return result
+
+
+def propagate_ramp(a: Array, b: Array, length: float, damper: Damper) -> Array:
+    """Exact propagation of `ż = a·z + b·(v, F, g, d)` with v moving from v0 to v1 and the others held.
+
+    By one matrix exponential with the inputs as further states (Van Loan 1978); shape (n, n + 5). A motor
+    without lag has its command as its force. The row of the acceleration is left zero.
+    """
+    from scipy.linalg import expm
+
+    size = a.shape[0]
+    big = np.zeros((size + 5, size + 5))
+    big[:size, :size] = a
+    big[:size, size] = b[:, RAMP]
+    big[size, size + 1] = 1.0 / length
+    big[:size, size + 2 :] = b[:, PUSH:]
+    whole = expm(big * length)
+    result = np.zeros((size, size + INPUTS))
+    result[:, :size] = whole[:size, :size]
+    result[:, ACCELERATION] = 0.0
+    result[ACCELERATION] = 0.0
+    result[:, size] = whole[:size, size] - whole[:size, size + 1]
+    result[:, size + 1] = whole[:size, size + 1]
+    result[:, size + 2 :] = whole[:size, size + 2 :]
+    if damper.motor_time_constant == 0.0:
+        result[MOTOR] = np.eye(size + INPUTS)[size + 2]
+    return result
