@@ -10,8 +10,8 @@ from common.recording.outcome import outcome
 from diagnosis.findings import where
 from diagnosis.findings.ceilings import ceilings, unknowns
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.further_tests.next_test import ChosenTest
 from diagnosis.findings.how_far import Response
-from diagnosis.findings.next_test import ChosenTest
 from diagnosis.findings.rest import shown
 from diagnosis.findings.series import numbers, strongest
 from diagnosis.findings.verdict import PartVerdict

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import details, exercise, how_far, next_test, parts_table, rest, trust, where
+from diagnosis.findings import details, how_far, parts_table, rest, trust, where
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.further_tests import exercise, next_test
 from diagnosis.findings.which import which
 from diagnosis.recorded.nuisances import LoggedForce, LoggedReadings
 from diagnosis.recorded.record import Record

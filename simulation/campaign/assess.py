@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from common.plan.plan import Plan
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.next_test import ENOUGH
+from diagnosis.findings.further_tests.next_test import ENOUGH
 from loop.closed_loop import Rollout
 from loop.nominal import limited
 from loop.signals import by_role

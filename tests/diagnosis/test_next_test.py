@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.findings import next_test
-from diagnosis.findings.next_test import ChosenTest
+from diagnosis.findings.further_tests import next_test
+from diagnosis.findings.further_tests.next_test import ChosenTest
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.residuals import Data

@@ -1,0 +1,1 @@
+"""What a recording could not show, and which further test would tell the remaining candidates apart."""
