@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
 from importlib import metadata
@@ -16,6 +17,8 @@ from tests.helpers import ROOT
 from tests.processes import HANG_S
 
 README = (ROOT / "README.md").read_text()
+# what a reader takes in at a look: files of a folder, lines of a function, parameters of a function
+MOST_FILES, MOST_LINES, MOST_PARAMETERS = 15, 60, 8
 
 
 def tracked() -> list[Path]:
@@ -124,3 +127,32 @@ def imported(path: Path, known: Mapping[str, Path]) -> set[str]:
                 whole = f"{node.module}.{alias.name}"
                 found.add(whole if whole in known else str(node.module))
     return found & known.keys()
+
+
+def test_folders_functions_and_signatures_stay_within_their_limits() -> None:
+    product = [
+        path for path in tracked() if path.suffix == ".py" and path.relative_to(ROOT).parts[0] in rooms()
+    ]
+    folders = Counter(path.parent for path in product if path.name != "__init__.py")
+    assert {str(folder): count for folder, count in folders.items() if count > MOST_FILES} == {}
+    bodies, signatures = {}, {}
+    for path in product:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                where = f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"
+                bodies[where] = (node.end_lineno or node.lineno) - node.body[0].lineno + 1
+                names = [one.arg for one in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
+                signatures[where] = len([name for name in names if name not in ("self", "cls")])
+    assert {where: lines for where, lines in bodies.items() if lines > MOST_LINES} == {}
+    assert {where: count for where, count in signatures.items() if count > MOST_PARAMETERS} == {}
+
+
+def rooms() -> set[str]:
+    """The folders of the product, which the floors of the import contract name."""
+    return {place.parent.name for place in ROOT.glob("*/__init__.py")} - {
+        "tests",
+        "docs",
+        "benchmarks",
+        "fuzz",
+        "examples",
+    }
