@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import tempfile
+import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -14,6 +16,7 @@ from laboratories.column.under_actuator import Array, UnderActuator
 from laboratories.kinds import KINDS
 
 INSTALL = "`make fmi` installs FMPy"
+REMEDY = "export it by FMI 3.0 for co-simulation"
 
 
 def library(name: str) -> Any:
@@ -24,6 +27,25 @@ def library(name: str) -> Any:
         raise InputError(
             f"An FMU cannot be loaded, because {error.name} is not installed: {INSTALL}."
         ) from None
+
+
+def version_of(file: str) -> str:
+    """The version of FMI that an FMU says; raises InputError where the file is none."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            text = archive.read("modelDescription.xml")
+    except (OSError, KeyError, zipfile.BadZipFile) as error:
+        raise unreadable(file, error) from None
+    found = re.search(rb"""fmiVersion\s*=\s*["']([^"']*)""", text)
+    if found is None:
+        raise unreadable(file, ValueError("its modelDescription.xml says no fmiVersion"))
+    return found[1].decode(errors="replace")
+
+
+def unreadable(file: str, error: Exception) -> InputError:
+    """The message for a file that is no FMU."""
+    why = " ".join(str(error).split()).rstrip(".") or type(error).__name__
+    return InputError(f"{file} cannot be read as an FMU ({why}): {REMEDY}.")
 
 
 class Fmu:
@@ -45,14 +67,17 @@ class Fmu:
     ) -> None:
         fmpy = library("fmpy")
         if not Path(file).is_file():
-            raise InputError(f"There is no FMU {file}.")
+            raise InputError(f"There is no FMU {file}: give the path of its file.")
+        version = version_of(file)
         try:
-            self._description = fmpy.read_model_description(file)
+            if version.startswith("3."):
+                self._description = fmpy.read_model_description(file)
         except Exception as error:  # FMPy raises many types for a damaged archive or description
-            raise InputError(f"{file} cannot be read as an FMU: {error}") from None
-        if self._description.coSimulation is None or not self._description.fmiVersion.startswith("3."):
-            version = self._description.fmiVersion
-            raise InputError(f"{file} is of FMI {version}, but must be an FMU of FMI 3.0 for co-simulation.")
+            raise unreadable(file, error) from None
+        if not version.startswith("3."):
+            raise InputError(f"{file} is of FMI {version}: {REMEDY}.")
+        if self._description.coSimulation is None:
+            raise InputError(f"{file} is not for co-simulation: {REMEDY}.")
         self._references = {row.name: row.valueReference for row in self._description.modelVariables}
         inputs, outputs = inputs or self._channels()[0], outputs or self._channels()[1]
         self._inputs, self._outputs = (self._of(file, names) for names in (inputs, outputs))

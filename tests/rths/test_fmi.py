@@ -215,10 +215,31 @@ def test_an_invalid_fmu_or_one_that_lacks_a_variable_is_refused(elastic: Path, t
     (tmp_path / "no.fmu").write_text("no archive")
     with zipfile.ZipFile(tmp_path / "empty.fmu", "w") as archive:
         archive.writestr("readme", "")
+    second = (
+        '<fmiModelDescription fmiVersion="2.0" modelName="m" guid="g"><ModelVariables/></fmiModelDescription>'
+    )
+    with zipfile.ZipFile(tmp_path / "second.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", second)
+    with zipfile.ZipFile(tmp_path / "broken.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", second.replace("2.0", "3.0"))
     cases: list[tuple[str, dict[str, Any], str]] = [
-        ("nowhere.fmu", {}, "There is no FMU nowhere.fmu"),
-        (str(tmp_path / "no.fmu"), {}, "cannot be read as an FMU"),
+        ("nowhere.fmu", {}, "There is no FMU nowhere.fmu: give the path"),
+        (
+            str(tmp_path / "no.fmu"),
+            {},
+            r"cannot be read as an FMU \(File is not a zip file\): export it by FMI 3.0",
+        ),
         (str(tmp_path / "empty.fmu"), {}, "cannot be read as an FMU"),
+        (
+            str(tmp_path / "second.fmu"),
+            {},
+            "second.fmu is of FMI 2.0: export it by FMI 3.0 for co-simulation.",
+        ),
+        (
+            str(tmp_path / "broken.fmu"),
+            {},
+            r"^[^\n]*broken.fmu cannot be read as an FMU \([^\n]*\): export it[^\n]*$",
+        ),
         (str(elastic), {}, "do not have the names of a kind's channels: give inputs and outputs"),
         (str(elastic), {"inputs": ["deformation"], "outputs": ["froce"]}, "has no variable 'froce': it has"),
     ]
