@@ -18,9 +18,8 @@ from simulation.workers.pool import spread
 # Recordings from which on several processes read sooner than one: their start takes as long as reading some eighty
 # recordings of 40 s, and two of them save half of the reading.
 FEW = 160
-LARGEST_REPORT = (
-    16 << 20
-)  # bytes of a JSON file that is looked into; a diagnosis report has some hundred thousand
+# Bytes of a JSON file up to which it is read as a possible diagnosis report, which has some hundred thousand.
+LARGEST_REPORT = 16 << 20
 
 
 class Renewal(NamedTuple):
