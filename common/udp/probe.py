@@ -34,7 +34,7 @@ def risk(probed: Probed, plan: Plan) -> Risk | None:
     """The risk of a rig that does not answer, has other channels or answers too late; None if there is none."""
     terms, found = probed.terms, probed.found
     if found.answer is None:
-        return Risk("rig", unanswered(terms))
+        return Risk("rig", unanswered(terms, found.faults))
     if complaint := compared(found.answer, probed.channels):
         return Risk("rig", f"of the rig at {terms.address} {complaint}")
     return slow(terms, found.round_trips_s, found.lost, plan)

@@ -50,6 +50,7 @@ class Echoes(NamedTuple):
     round_trips_s: tuple[float, ...]
     lost: int
     answer: RigAnswer | None  # the last one
+    faults: int = 0  # packets from there that were no valid answers of this layout
 
 
 def echoes(peer: Peer, terms: Terms, session: int, channels: int) -> Echoes:
@@ -57,11 +58,12 @@ def echoes(peer: Peer, terms: Terms, session: int, channels: int) -> Echoes:
     trips: list[float] = []
     answer: RigAnswer | None = None
     patience, lost = FIRST_NS, 0
+    faults: list[str] = []
     for seq in range(TRIES + ECHOES):
         sent = time.monotonic_ns()
         request = Request(Asked.ECHO, session, seq, terms.interval, terms.silence, 0, 0, channels)
         peer.send(packets.pack(request))
-        found = answer_to(peer, session, seq, sent + patience)
+        found = answer_to(peer, session, seq, sent + patience, faults)
         if found is None and answer is None:
             if seq == TRIES - 1:
                 break
@@ -73,13 +75,21 @@ def echoes(peer: Peer, terms: Terms, session: int, channels: int) -> Echoes:
         answer = found or answer
         if len(trips) + lost == ECHOES:
             break
-    return Echoes(tuple(trips), lost, answer)
+    return Echoes(tuple(trips), lost, answer, len(faults))
 
 
-def answer_to(peer: Peer, session: int, seq: int, deadline: int) -> RigAnswer | None:
-    """The answer to the packet `seq` of a session, None if it does not arrive before the deadline (ns)."""
+def answer_to(
+    peer: Peer, session: int, seq: int, deadline: int, faults: list[str] | None = None
+) -> RigAnswer | None:
+    """The answer to the packet `seq` of a session, None if it does not arrive before the deadline (ns).
+
+    The faults of packets that are no valid answers are added to `faults`.
+    """
     while (packet := peer.receive(deadline)) is not None:
-        if not packets.fault(packet):
+        if fault := packets.fault(packet):
+            if faults is not None:
+                faults.append(fault)
+        else:
             answer = packets.unpack(packet)
             if (answer.session, answer.seq) == (session, seq):
                 return answer
@@ -115,7 +125,7 @@ class UdpRig:
         self._seq = TRIES + ECHOES
         self.echoes = found = echoes(self._peer, self.terms, self._session, self._channels)
         if found.answer is None:
-            raise RigError(f"{unanswered(self.terms)}.")
+            raise RigError(f"{unanswered(self.terms, found.faults)}.")
         self._compare(found.answer)
         self.idle_readings = len(found.answer.values) == self._count
         self._values = self._ready().values
@@ -251,8 +261,13 @@ class UdpRig:
         )
 
 
-def unanswered(terms: Terms) -> str:
-    """The text of the message on a rig that does not answer at all."""
+def unanswered(terms: Terms, faults: int) -> str:
+    """The text of the message on a rig that does not answer at all, or only with packets that are not valid."""
+    if faults:
+        return (
+            f"{terms.address} answers with packets that are not valid ({faults} of wrong length, checksum or version): "
+            "compare them with the layout in docs/reference/udp-rig.md"
+        )
     return f"nothing answers at {terms.address}: start the rig's program there, or correct address in {terms.where}"
 
 

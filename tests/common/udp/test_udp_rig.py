@@ -164,6 +164,7 @@ def test_a_rig_that_stops_on_its_own_ends_the_test_with_its_own_words(
     ("answers", "text"),
     [
         (lambda *_: [], "nothing answers at udp/"),
+        (lambda *_: [b"short"], "answers with packets that are not valid"),
         (at(Asked.ARM, set(), lambda _: []), "it was not ready after 0.3 s and says: nothing"),
         (
             at(Asked.ARM, set(), lambda one: [changed(one, state=RigState.IDLE, text=b"busy")]),
@@ -179,7 +180,7 @@ def test_a_rig_that_stops_on_its_own_ends_the_test_with_its_own_words(
         ),
         (at(Asked.ECHO, set(), lambda one: [changed(one, channels=5)]), "so it is the rig of another kind"),
     ],
-    ids=["not there", "does not arm", "busy", "slow", "numbers", "channels"],
+    ids=["not there", "short packets", "does not arm", "busy", "slow", "numbers", "channels"],
 )
 def test_a_rig_that_is_not_ready_gives_its_reason(
     answers: Answers, text: str, monkeypatch: pytest.MonkeyPatch
