@@ -18,6 +18,7 @@ TRACEBACK = "Traceback (most recent call last):"
 # types whose text is a sentence by itself; of others, such as KeyError, the type says what the text means
 PLAIN = ("RuntimeError", "ValueError", "ModuleNotFoundError")
 TYPED = re.compile(rf"^(?:{'|'.join(PLAIN)}): ")
+TIDY_S = 0.5  # s in which a program that waits for input ends by itself, and deletes its temporary files
 # text of an exception of a library that wrote the reason on standard error just before
 BEFORE = "See stderr output"
 
@@ -115,10 +116,12 @@ def reason(lines: Sequence[str], file: str = "") -> str:
 
 
 def _end(process: subprocess.Popen[bytes], said: IO[bytes]) -> None:
-    """End the process and close its streams."""
-    process.kill()
+    """End the process and close its streams; at the end of its input it may tidy up for a moment."""
     for stream in (process.stdin, process.stdout, said):
         if stream is not None and not stream.closed:
             with contextlib.suppress(BrokenPipeError):  # `close` flushes to a process that has ended
                 stream.close()
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(TIDY_S)
+    process.kill()
     process.wait()

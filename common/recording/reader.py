@@ -118,7 +118,9 @@ class Tail:
         try:
             self._stream = self.path.open("rb")
         except OSError as error:
-            raise InputError(f"Cannot read the recording {self.path}: {error.strerror}.") from None
+            raise InputError(
+                f"Cannot read the recording {self.path}: {error.strerror}; give the path of a file (MCAP)."
+            ) from None
 
     def look(self, most: float = LOOK_BYTES) -> Run:
         """The messages since the last look, from at most `most` bytes of the file and one record; all metadata so far.

@@ -70,6 +70,10 @@ class Floors:
         self._motion = self._told(present[0], present[1])
         return [*present[0], *present[1], *present[2], *self._motion[0], *self._motion[1]]
 
+    def close(self) -> None:
+        """Terminate the FMU, and delete its unpacked files."""
+        self._fmu.end()
+
 
 def main() -> int:
     """Serve until standard input ends."""
@@ -78,14 +82,24 @@ def main() -> int:
     source = sys.stdin.buffer
     try:
         floors = Floors(json.loads(source.readline()))
+    except RthsError as error:
+        return complained(error)
+    try:
         forces, motion = struct.Struct(f"<{floors.count}d"), struct.Struct(f"<{5 * floors.count}d")
         os.write(out, COUNT.pack(floors.count))
         while data := source.read(forces.size):
             os.write(out, motion.pack(*floors.step(forces.unpack(data))))
     except RthsError as error:
-        sys.stderr.write(f"{error}\n")
-        return error.exit_code
+        return complained(error)
+    finally:
+        floors.close()
     return 0
+
+
+def complained(error: RthsError) -> int:
+    """Write an error where the process that started this one reads it; the exit code."""
+    sys.stderr.write(f"{error}\n")
+    return error.exit_code
 
 
 if __name__ == "__main__":

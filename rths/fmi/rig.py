@@ -122,6 +122,7 @@ class Fmu:
             self._instance.enterInitializationMode(startTime=0.0)
             self._instance.exitInitializationMode()
         except Exception as error:  # FMPy and the FMU raise many types
+            shutil.rmtree(self._folder, ignore_errors=True)
             raise RigError(
                 f"the FMU {Path(self._file).name} cannot be started: {self._said or error}"
             ) from None

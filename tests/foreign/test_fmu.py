@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shutil
 import sys
 from importlib.util import find_spec
@@ -103,6 +104,16 @@ def test_the_loop_with_an_fmu_equals_the_loop_with_the_masters_own_building(
     # the FMU gives the velocity at the end of a step, and the acceleration at its beginning: one step later
     assert found["velocity"] == pytest.approx(own["velocity"], abs=1e-5)
     assert found["acceleration"][1:] == pytest.approx(own["acceleration"][:-1], abs=1e-9)
+
+
+def test_the_process_of_a_building_leaves_no_unpacked_fmu(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (place := tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(place))
+    played(FOREIGN, folder, tmp_path / "found.mcap")
+    gc.collect()
+    assert list(place.iterdir()) == []
 
 
 def test_an_fmu_without_velocities_gets_them_from_differences(folder: Path, tmp_path: Path) -> None:

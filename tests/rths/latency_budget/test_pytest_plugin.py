@@ -103,7 +103,12 @@ def test_a_budget_comes_from_the_option_or_from_the_call(tmp_path: Path, words: 
 def test_a_mistake_gives_one_sentence(tmp_path: Path) -> None:
     code, out = child(tmp_path)
     assert code == 1
-    assert out.count("Cannot read the recording run.mcap: No such file or directory.") == 1
+    assert (
+        out.count(
+            "Cannot read the recording run.mcap: No such file or directory; give the path of a file (MCAP)."
+        )
+        == 1
+    )
     assert "Error" not in out.replace("FAILED", "")
     assert "pytest_plugin.py" not in out
     assert "During handling" not in out

@@ -226,8 +226,11 @@ def test_the_page_of_a_stopped_test_states_the_cause(virtual_recording: Path) ->
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["{tmp}/no.mcap"], "Cannot read the recording {tmp}/no.mcap: No such file or directory."),
-        (["{tmp}"], "Cannot read the recording {tmp}: Is a directory."),
+        (
+            ["{tmp}/no.mcap"],
+            "Cannot read the recording {tmp}/no.mcap: No such file or directory; give the path of a file (MCAP).",
+        ),
+        (["{tmp}"], "Cannot read the recording {tmp}: Is a directory; give the path of a file (MCAP)."),
         (["{tmp}/text.mcap"], "is not a readable MCAP recording"),
         (["{file}", "-o", "{tmp}"], "Cannot write {tmp}: it is a folder"),
         (["{file}", "-o", "{tmp}/no/a.html"], "There is no folder {tmp}/no for a.html"),
