@@ -249,7 +249,12 @@ class Feed:
     @property
     def ended(self) -> bool:
         """Whether the recording is complete, so that nothing more will come."""
-        return bool(self._tail.finished or self._tail.damage or self.failure)
+        return bool(self.finished or self._tail.damage or self.failure)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the recorder has ended the recording in order."""
+        return bool(self._tail.finished)
 
     @property
     def state(self) -> str:

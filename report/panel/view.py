@@ -59,7 +59,8 @@ class PanelView:
         return max(self._clock.now() - at, 0) * 1e-9
 
     def _test(self, shown: Shown, feed: Feed) -> dict[str, Any]:
-        """The test that runs."""
+        """The test that runs; a master that leaves after the recording's end has cut no link."""
+        unlinked = shown.unlinked_at and not feed.finished
         return {
             "id": shown.test,
             "name": shown.name,
@@ -67,7 +68,7 @@ class PanelView:
             "recording": str(shown.recording or ""),
             "own": shown.own,
             "linked": shown.linked,
-            "unlinked": self._seconds(shown.unlinked_at) if shown.unlinked_at else None,
+            "unlinked": self._seconds(shown.unlinked_at) if unlinked else None,
             "t": feed.t,
             "duration": shown.plan.test.duration,
         }
@@ -169,8 +170,8 @@ def causes(snapshot: Snapshot, feed: Feed) -> list[dict[str, str]]:
     found = [
         {"lab": title(one.lab), "t": f"t = {one.t:.2f} s", "text": one.text} for one in feed.standing.stops
     ]
-    reports = snapshot.shown.reports.causes if snapshot.shown else snapshot.last
-    return (found or [{"lab": title(lab), "t": "", "text": text} for lab, text in reports])[:CAUSES]
+    reported = snapshot.shown.reports.causes if snapshot.shown else snapshot.last
+    return (found or [{"lab": title(lab), "t": "", "text": text} for lab, text in reported])[:CAUSES]
 
 
 def bars(feed: Feed) -> Iterator[dict[str, Any]]:

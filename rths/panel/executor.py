@@ -148,7 +148,7 @@ class PanelExecutor:
         return settled
 
     def close(self) -> str:
-        """End the thread; what a test that goes on must be known of, in a sentence, or an empty text."""
+        """End the thread; a sentence on a test that goes on, empty where there is none."""
         self._closing.set()
         self._thread.join()
         self._opener.shutdown()

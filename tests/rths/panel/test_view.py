@@ -129,6 +129,18 @@ def test_a_process_that_ended_is_shown_as_lost_or_as_left_in_order(watched: Watc
     assert [lab["mode"] for lab in watched.state()["labs"]] == ["left", "left"]
 
 
+def test_a_lost_link_has_its_age_until_the_recording_has_ended(watched: Watched) -> None:
+    assert watched.shown is not None
+    assert watched.state()["test"]["unlinked"] is None
+    watched.to(0.5)
+    watched.shown = watched.shown._replace(linked=False, unlinked_at=watched.clock.time)
+    watched.clock.time += 3 * SECOND
+    assert watched.state()["test"]["unlinked"] == pytest.approx(3.0)
+    watched.to(1.0)
+    assert watched.feed.finished
+    assert watched.state()["test"]["unlinked"] is None  # the master has left in order
+
+
 def test_a_test_that_was_started_elsewhere_is_known_only_by_its_recording(watched: Watched) -> None:
     assert watched.shown is not None
     watched.shown = watched.shown._replace(own=False)
