@@ -65,6 +65,11 @@ class Free:
         return self.inward(least), self.inward(most)
 
 
+def left_out(parameter: Parameter, values: Mapping[str, float]) -> bool:
+    """Whether a shape is at the end of its range where it has no influence, so that a fit leaves it there."""
+    return parameter.shape and parameter.default == parameter.least == values[parameter.name]
+
+
 def free(effect: Effect, values: Mapping[str, float]) -> list[Free]:
     """The parameters of an effect as a fit moves them, from where it starts."""
     result = []
@@ -73,8 +78,8 @@ def free(effect: Effect, values: Mapping[str, float]) -> list[Free]:
         if law and parameter.shape and parameter.name not in law.shapes:
             continue
         logarithmic = math.isinf(parameter.null) or (parameter.shape and parameter.least > 0.0)
-        if parameter.shape and parameter.default == parameter.least == values[parameter.name]:
-            continue  # a shape that is left out
+        if left_out(parameter, values):
+            continue
         size = abs(values[parameter.name] - (0.0 if parameter.shape else parameter.null))
         scale = size if size > 0.0 and math.isfinite(size) else 1.0
         result.append(Free(effect.name, parameter, scale, logarithmic))

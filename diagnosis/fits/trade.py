@@ -15,7 +15,7 @@ import numpy as np
 from diagnosis.fits import candidates, fitting, worth
 from diagnosis.fits.candidates import TIED
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.hypothesis import Problem
+from diagnosis.fits.hypothesis import Problem, left_out
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.unexplained import leaves
 
@@ -84,13 +84,9 @@ def alone(fit: Fit) -> list[Fit]:
         effect = fit.data.catalogue[name]
         law = effect.law(values)
         starts = law.shapes if law else {}
-        left_out = [
-            item.name
-            for item in effect.parameters
-            if item.shape and item.name in starts and values[item.name] == item.default == item.least
-        ]
-        if left_out:
-            shaped = {**values, **{shape: starts[shape] for shape in left_out}}
+        shapes = [item.name for item in effect.parameters if item.name in starts and left_out(item, values)]
+        if shapes:
+            shaped = {**values, **{shape: starts[shape] for shape in shapes}}
             result.append(fitting.polished(fitting.fit(fit.data, {name: shaped}, fit.z)))
     return result
 
