@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -77,7 +76,7 @@ def run(*, quick: bool = False) -> list[BenchmarkFigure]:
         for _ in range(1 if quick else QUESTIONS):
             asked.append(command("catalog", "--in", folder, "find", QUESTION))
             peer.append(timed("-c", BARE, folder / store.NAME))
-        with sqlite3.connect(folder / store.NAME) as base:
+        with store.opened(folder / store.NAME) as base:
             (count,) = base.execute("SELECT count(*) FROM recordings WHERE state = 'whole'").fetchone()
         if count != recordings:
             raise RuntimeError(f"The catalogue has {count} of {recordings} recordings.")

@@ -50,7 +50,7 @@ class MasterHandshake:
         self._awaits = gate is not None and gate.await_start
         self._served = False  # whether the link to every slave has passed its check
         self._waits_ns = 0  # since when the start waits for an operator, 0 where it does not
-        self._told_awaited = False  # whether the wait for the building's program has been reported
+        self._wait_reported = False  # whether the wait for the building's program has been reported
         for partner in partners if gate else ():
             partner.pass_gate(lab.plan.preflight.exchanges)
 
@@ -249,17 +249,22 @@ class MasterHandshake:
             return True
         if self._lab.exchange.state is State.IDLE and self.complete and (whom := self._building.awaited):
             self._lab.heard_ns = self._lab.clock.now()  # nothing is armed: there is no hurry
-            self._say_awaited(whom)
+            self._report_wait(whom)
         return False
 
-    def _say_awaited(self, whom: str) -> None:
+    def _report_wait(self, whom: str) -> None:
         """Report once that the test waits for the program that computes its building."""
-        if self._told_awaited:
+        if self._wait_reported:
             return
-        self._told_awaited = True
-        text = f"Waits for {whom}."
-        told = {"t": 0.0, "lab": self._lab.name, "level": "info", "code": "await_client", "text": text}
-        self._lab.report("event", told)  # which is not recorded: there is no test time yet
+        self._wait_reported = True
+        event = {
+            "t": 0.0,
+            "lab": self._lab.name,
+            "level": "info",
+            "code": "await_client",
+            "text": f"Waits for {whom}.",
+        }
+        self._lab.report("event", event)  # which is not recorded: there is no test time yet
 
     def _nobody(self) -> None:
         if self._lab.exchange.state is not State.IDLE:

@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+import tomllib
 from collections import Counter
 from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
@@ -148,11 +149,6 @@ def test_folders_functions_and_signatures_stay_within_their_limits() -> None:
 
 
 def rooms() -> set[str]:
-    """The folders of the product, which the floors of the import contract name."""
-    return {place.parent.name for place in ROOT.glob("*/__init__.py")} - {
-        "tests",
-        "docs",
-        "benchmarks",
-        "fuzz",
-        "examples",
-    }
+    """The folders of the product, as the import contract names them."""
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        return set(tomllib.load(file)["tool"]["importlinter"]["root_packages"])
