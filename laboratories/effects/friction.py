@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from laboratories.effects.effect import Law, Parameter
+from laboratories.effects.laws import which_law
 
 VELOCITY = Parameter(
     "velocity",
@@ -20,16 +21,7 @@ VELOCITY = Parameter(
 )
 
 FURTHER = {
-    "": Parameter(
-        "law",
-        "",
-        0.0,
-        0.0,
-        1.0,
-        (),
-        "0 the same in both directions and at all speeds, 1 by direction and speed",
-        shape=True,
-    ),
+    "": which_law(1.0, "0 the same in both directions and at all speeds, 1 by direction and speed"),
     "friction_asymmetry": Parameter(
         "asymmetry",
         "",

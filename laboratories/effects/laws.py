@@ -104,6 +104,11 @@ def added(system: System, *, table: str, key: str, **given: float) -> System:
     return system.moved(table, **{key: max(getattr(getattr(system.plan, table), key) + more, 0.0)})
 
 
+def which_law(most: float, says: str) -> Parameter:
+    """The parameter `law`, by which an effect with laws 0 to `most` chooses its formula; `says` names them."""
+    return Parameter("law", "", null=0.0, least=0.0, most=most, sizes=(), says=says, shape=True)
+
+
 def extra_time(name: str, sizes: tuple[float, ...]) -> Parameter:
     """The parameter of a time (s) that is added to a planned delay or lag, from −50 ms to 0.2 s.
 

@@ -12,7 +12,7 @@ Not to be confused with `column.yielding`, which dissipates energy, `column.degr
 from __future__ import annotations
 
 from laboratories.effects.effect import Law, Parameter
-from laboratories.effects.laws import sets
+from laboratories.effects.laws import sets, which_law
 
 EFFECT = sets(
     "column",
@@ -29,16 +29,7 @@ EFFECT = sets(
         ),
     },
     further={
-        "stiffening_law": Parameter(
-            "law",
-            "",
-            null=0.0,
-            least=0.0,
-            most=2.0,
-            sizes=(),
-            says="0 with the square of the deformation, 1 at a bend, 2 at two bends",
-            shape=True,
-        ),
+        "stiffening_law": which_law(2.0, "0 with the square of the deformation, 1 at a bend, 2 at two bends"),
         "stiffening_bend": Parameter(
             "bend",
             "m",

@@ -14,7 +14,7 @@ sharp edge and no force within it, or with `actuator.backlash`.
 from __future__ import annotations
 
 from laboratories.effects.effect import Law, Parameter
-from laboratories.effects.laws import sets
+from laboratories.effects.laws import sets, which_law
 
 EFFECT = sets(
     "column",
@@ -51,16 +51,7 @@ EFFECT = sets(
         ),
     },
     further={
-        "pinching_law": Parameter(
-            "law",
-            "",
-            null=0.0,
-            least=0.0,
-            most=1.0,
-            sizes=(),
-            says="0 the reduction is a bell without tails, 1 with tails",
-            shape=True,
-        ),
+        "pinching_law": which_law(1.0, "0 the reduction is a bell without tails, 1 with tails"),
         "pinching_tails": Parameter(
             "tails",
             "",

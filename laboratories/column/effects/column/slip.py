@@ -19,7 +19,7 @@ transition is smooth.
 from __future__ import annotations
 
 from laboratories.effects.effect import Law, Parameter
-from laboratories.effects.laws import sets
+from laboratories.effects.laws import sets, which_law
 
 EFFECT = sets(
     "column",
@@ -36,15 +36,9 @@ EFFECT = sets(
         ),
     },
     further={
-        "slip_law": Parameter(
-            "law",
-            "",
-            null=0.0,
-            least=0.0,
-            most=3.0,
-            sizes=(),
-            says="0 around the origin, 1 where the specimen rests, 2 where friction holds it, 3 beside a gapless part",
-            shape=True,
+        "slip_law": which_law(
+            3.0,
+            "0 around the origin, 1 where the specimen rests, 2 where friction holds it, 3 beside a gapless part",
         ),
         "slip_share": Parameter(
             "share",

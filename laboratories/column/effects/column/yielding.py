@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 
 from laboratories.effects.effect import Law, Parameter
-from laboratories.effects.laws import sets
+from laboratories.effects.laws import sets, which_law
 
 SKELETON = {"first_bend": 0.5, "second_stiffness": 0.5}
 # Of the yield displacement. Between two ticks the noise of a command turns the motion by this much, in the laboratory
@@ -74,16 +74,10 @@ EFFECT = sets(
         ),
     },
     further={
-        "law": Parameter(
-            "law",
-            "",
-            null=0.0,
-            least=0.0,
-            most=10.0,
-            sizes=(),
-            says="0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented, 4 trilinear, 5 pinched, 6 both, "
+        "law": which_law(
+            10.0,
+            "0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented, 4 trilinear, 5 pinched, 6 both, "
             "7 and 8 as these with the corner by the peak, 9 and 10 by its rest",
-            shape=True,
         ),
         "unloading": Parameter(
             "unloading",

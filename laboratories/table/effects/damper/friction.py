@@ -17,11 +17,9 @@ reversal alone.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from laboratories.effects.effect import Law, Parameter
 from laboratories.effects.friction import FURTHER, VELOCITY, laws
-from laboratories.effects.laws import sets
+from laboratories.effects.laws import sets, which_law
 
 COULOMB = {"velocity": 1e-6}
 
@@ -34,10 +32,9 @@ EFFECT = sets(
     },
     further=FURTHER
     | {
-        "": replace(
-            FURTHER[""],
-            most=2.0,
-            says="0 the same in both directions and at all speeds, 1 by direction and speed, 2 with presliding",
+        "": which_law(
+            2.0,
+            "0 the same in both directions and at all speeds, 1 by direction and speed, 2 with presliding",
         ),
         "presliding": Parameter(
             "presliding",

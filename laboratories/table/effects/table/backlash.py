@@ -18,7 +18,7 @@ amplitude, or with `table.oil_column`, whose resonance is the same at every ampl
 from __future__ import annotations
 
 from laboratories.effects.effect import Law, Parameter
-from laboratories.effects.laws import sets
+from laboratories.effects.laws import sets, which_law
 
 EFFECT = sets(
     "table",
@@ -35,16 +35,7 @@ EFFECT = sets(
         ),
     },
     further={
-        "backlash_law": Parameter(
-            "law",
-            "",
-            null=0.0,
-            least=0.0,
-            most=1.0,
-            sizes=(),
-            says="0 before the servo loop, 1 between it and the platform",
-            shape=True,
-        ),
+        "backlash_law": which_law(1.0, "0 before the servo loop, 1 between it and the platform"),
         "flank_frequency": Parameter(
             "contact",
             "Hz",
