@@ -19,6 +19,8 @@ TRACEBACK = "Traceback (most recent call last):"
 PLAIN = ("RuntimeError", "ValueError", "ModuleNotFoundError")
 TYPED = re.compile(rf"^(?:{'|'.join(PLAIN)}): ")
 TIDY_S = 0.5  # s in which a program that waits for input ends by itself, and deletes its temporary files
+# begins the line in which a program gives the reason itself, whatever its own child processes write beside it
+REASON = "rths: "
 # text of an exception of a library that wrote the reason on standard error just before
 BEFORE = "See stderr output"
 
@@ -97,9 +99,11 @@ class PipedProgram:
 def reason(lines: Sequence[str], file: str = "") -> str:
     """The reason in what a program wrote on standard error, in one line.
 
-    Of an exception it is its text, with its type unless the text is a sentence by itself, and its line in the user's
-    `file`. Else it is the last line.
+    It is what follows `REASON` where a line begins so. Else, of an exception it is its text, with its type unless the
+    text is a sentence by itself, and its line in the user's `file`. Else it is the last line.
     """
+    if given := [line.removeprefix(REASON) for line in lines if line.startswith(REASON)]:
+        return given[0].strip()
     marks = [number for number, line in enumerate(lines) if line == TRACEBACK]
     if not marks:
         return TYPED.sub("", lines[-1].strip())

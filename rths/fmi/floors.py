@@ -11,6 +11,7 @@ from typing import Any
 
 from common.errors import InputError, RthsError
 from common.opensees.frame import COUNT
+from common.piped import REASON
 from rths.fmi.rig import Fmu
 
 GROUND = "ground_acceleration"
@@ -98,7 +99,8 @@ def main() -> int:
 
 def complained(error: RthsError) -> int:
     """Write an error where the process that started this one reads it; the exit code."""
-    sys.stderr.write(f"{error}\n")
+    sys.stderr.write(f"{REASON}{error}\n")
+    sys.stderr.flush()
     return error.exit_code
 
 
