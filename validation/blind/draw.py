@@ -21,13 +21,12 @@ from laboratories.effects.effect import Parameter
 from validation.blind import lots
 from validation.blind.cases.basis import TrialBasis, another_motion, basis, draw_plan, log_uniform
 from validation.blind.cases.case import Case, Laid
-from validation.blind.cases.truths import draw_truths, is_inside
+from validation.blind.cases.truths import TWO_TOLERANCES, draw_truths, is_inside
 from validation.blind.library import MATERIAL, REPLACED, Library
 from validation.blind.lots import Lot
 from validation.blind.sets import MILD, SETS, SHARES
 
 KINDS = (*SHARES, "many", MATERIAL)
-TWO_TOLERANCES = 2.0  # standard deviations: 95 of 100 normal parameters are within
 # Draws after which a wanted case is taken not to exist. A single effect comes at least once in about 600 cases, a given
 # pair once in some ten thousand; the draws take about two minutes.
 PATIENCE = 200_000

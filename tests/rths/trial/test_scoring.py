@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -138,6 +139,28 @@ def test_an_effect_within_the_tolerances_may_be_reported_as_no_gap() -> None:
     assert judged(case("catalogue", SOFT, inside=True), answer("no_gap")).right
     assert not judged(case("catalogue", SOFT, inside=True), answer("no_gap")).visible
     assert not judged(case("catalogue", SOFT), answer("no_gap")).right
+
+
+@pytest.mark.parametrize(
+    ("true", "normal", "said", "right"),
+    [
+        (26.6e6, True, 1.044, True),
+        (26.6e6, True, 0.97, False),
+        (25.8e6, True, 1.044, False),
+        (26.6e6, False, 1.044, False),
+    ],
+)
+def test_a_parameter_that_is_truly_more_than_two_tolerances_off_may_be_named(
+    true: float, normal: bool, said: float, right: bool
+) -> None:
+    plain = case("clean")
+    what = replace(plain, truths={"structure": {"stiffness": true}}, normal=normal)
+    report = answer("explained", "structure.stiffness")
+    report["which"][0]["parameters"] = {
+        "structure.stiffness": {"factor": value(said, said - 0.01, said + 0.01)}
+    }
+    found = judged(what, report)
+    assert (found.right, found.surplus) == (right, 0 if right else 1)
 
 
 def test_an_unknown_effect_is_right_if_reported_as_unknown_at_its_site() -> None:

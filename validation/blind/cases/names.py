@@ -15,6 +15,7 @@ from diagnosis.report.records import Report
 from diagnosis.report.values import Value
 from laboratories import effects
 from laboratories.effects import sites
+from laboratories.effects.effect import Effect
 from laboratories.kinds import kinds_of
 from validation.blind.cases.case import Laid
 
@@ -43,13 +44,15 @@ class CaseNames:
         self._kinds = kinds_of(plan)
         self._slaves = plan.roles
         self._site_of = {name: effect.site for name, effect in effects.of_plan(plan).items()}
-        # site and fault of a reading by effect, all in names that are unique in the whole test
+        # site, fault of a reading, and role and effect, all by names that are unique in the whole test
         self.sites: dict[str, str] = {}
         self.faults: dict[str, str] = {}
+        self.placed: dict[str, tuple[str, Effect]] = {}
         for role in (MASTER, *plan.roles):
             for name, effect in effects.of_role(plan, role).items():
                 self.sites[self.whole(role, name, effect.site)] = self.whole(role, effect.site, effect.site)
                 self.faults[self.whole(role, name, effect.site)] = effect.fault
+                self.placed[self.whole(role, name, effect.site)] = (role, effect)
 
     def whole(self, role: str, name: str, site: str) -> str:
         """The name of a site, or of an effect at it, in a role's laboratory or over its link."""

@@ -12,8 +12,10 @@ from common.plan.plan import Plan
 from common.plan.schema import plain
 from common.reality import reality as realities
 from common.roles import MASTER, SLAVE, name_of
+from laboratories.effects.effect import Effect
 from laboratories.kind import Kind
 from laboratories.kinds import KINDS, kind_of, kinds_of
+from models.registry import Array
 from models.system import Effects, System
 from validation.blind import lots
 from validation.blind.cases.basis import log_uniform
@@ -31,6 +33,7 @@ UNCERTAIN = {
 }
 # Factor on the plan's noise, the same for all sensors: from sensors twice as good as stated to those in a noisy hall.
 NOISE = (0.5, 3.0)
+TWO_TOLERANCES = 2.0  # standard deviations: 95 of 100 normal parameters are within
 ROUNDING = 1e-12  # relative, of products of a few factors
 # Tolerances: one normal draw in fifteen thousand is larger, and would have the wrong sign at 25 %.
 MOST_MOVED = 4.0
@@ -156,35 +159,52 @@ def is_inside(
     )
 
 
-def stays_inside(plan: Plan, role: str, true: Plan, moved: System, most: float) -> bool:
-    """Whether a role's true plan with its effects is within `most` tolerances of the whole plan."""
-    if moved.effects != Effects():
-        return False
-    nominal, there = plan.of(role), moved.plan.tables()
-    close = [
-        near(
-            there["structure"][name],
-            nominal.tables()["structure"][name],
-            most * tolerance(plan, "structure", name),
-        )
-        for name in of_building(plan)
-    ]
-    if role in plan.kinds:
-        kind = kind_of(plan, role)
-        close += [
-            near(
-                kind.planned(moved.plan, name),
-                kind.planned(nominal, name),
-                most * kind.tolerance(nominal, name),
-            )
-            for name in parameters(kind, nominal)
-        ]
-    return all(close) and all(
-        there[name] == table for name, table in true.tables().items() if name not in UNCERTAIN
+def is_truly_off(
+    truths: dict[str, Any], plan: Plan, placed: tuple[str, Effect], found: dict[str, float], most: float
+) -> bool:
+    """Whether an effect (role, effect) as it was found only moves known parameters, of which one is truly far off.
+
+    That is by more than `most` tolerances from its nominal value, to the side on which it was found.
+    """
+    role, effect = placed
+    true = realities.true_plan(truths, plan).of(role)
+    moved = effect.apply(System(plan.of(role)), **effect.values(found))
+    pairs = zip(departures(plan, role, moved.plan), departures(plan, role, true), strict=True)
+    return moved.effects == Effects() and any(
+        bool(np.any(there * np.sign(here) > most * width)) for (here, width), (there, _) in pairs
     )
 
 
-def near(value: Any, nominal: Any, width: float) -> bool:
-    """Whether a value, or each of several, is within a relative width of the nominal one."""
-    ratio = np.asarray(value) / np.asarray(nominal)
-    return bool(np.all(np.abs(ratio - 1.0) <= width + ROUNDING))
+def stays_inside(plan: Plan, role: str, true: Plan, moved: System, most: float) -> bool:
+    """Whether a role's true plan with its effects is within `most` tolerances of the whole plan."""
+    there = moved.plan.tables()
+    return (
+        moved.effects == Effects()
+        and all(
+            bool(np.all(np.abs(off) <= most * width + ROUNDING))
+            for off, width in departures(plan, role, moved.plan)
+        )
+        and all(there[name] == table for name, table in true.tables().items() if name not in UNCERTAIN)
+    )
+
+
+def departures(plan: Plan, role: str, there: Plan) -> list[tuple[Array, float]]:
+    """By what share each known parameter of a role's plan `there` differs from the nominal one, and its tolerance."""
+    nominal = plan.of(role)
+    ours, theirs = nominal.tables()["structure"], there.tables()["structure"]
+    result = [
+        (share(theirs[name], ours[name]), tolerance(plan, "structure", name)) for name in of_building(plan)
+    ]
+    if role in plan.kinds:
+        kind = kind_of(plan, role)
+        result += [
+            (share(kind.planned(there, name), kind.planned(nominal, name)), kind.tolerance(nominal, name))
+            for name in parameters(kind, nominal)
+        ]
+    return result
+
+
+def share(value: Any, nominal: Any) -> Array:
+    """By what share a value, or each of several, differs from the nominal one."""
+    found: Array = np.asarray(value) / np.asarray(nominal) - 1.0
+    return found

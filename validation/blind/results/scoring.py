@@ -3,7 +3,8 @@
 Naming any one effect of a set that the report calls equivalent counts as naming the set. An effect counts as named
 where the status names causes (`NAMING`). A laboratory whose parameters are all inside their tolerances, effect
 included, has no gap, and a report that says so is right. Distortions by a data logger may be named beside the effect,
-or without one, because they are real.
+or without one, because they are real. So may nominal parameters that are truly more than two tolerances off, in sets
+whose tolerances are standard deviations.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from diagnosis.report.values import Value
 from validation.blind.best import best_closed
 from validation.blind.cases.case import Case, Laid
 from validation.blind.cases.names import NAMING, CaseNames, Heard
+from validation.blind.cases.truths import TWO_TOLERANCES, is_truly_off
 from validation.blind.judge import NONE, DiagnosisAnswer
 from validation.blind.labs.materials import MATERIALS
 from validation.blind.library import MATERIAL
@@ -124,7 +126,11 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
         if (one := report_on(item, heard)) and one.site in right_sites(item, one, names)
     ]
     truth = [names.effect(item) for item in case.laid]
-    own = [name for name in verdict if not is_distortion(case, name, names) or name in truth]
+    own = [
+        name
+        for name in verdict
+        if name in truth or not any(is_real(case, name, one, names) for one in heard if name in one.names)
+    ]
     right_names = {name for item in case.laid for name in truths(item, names)}
     wrong = [name for name in own if not any(same(item, name, sets) for item in right_names)]
     asked_for = visible(case, recorded)
@@ -206,7 +212,10 @@ def is_named(
     if case.kind == "clean":
         return bool(heard) and all(is_quiet(case, one, names) for one in heard)
     if case.kind == "unknown":
-        sure = any(one.names and number(one.probability) >= SURE for one in consulted(case, heard))
+        sure = any(
+            not all(is_real(case, name, one, names) for name in one.names) and number(one.probability) >= SURE
+            for one in consulted(case, heard)
+        )
         return status in UNKNOWN and not sure
     if case.inside and status in QUIET:
         return True
@@ -215,9 +224,20 @@ def is_named(
 
 
 def is_quiet(case: Case, one: Heard, names: CaseNames) -> bool:
-    """Whether a report has no gap, or only distortions by the case's logger."""
-    logged = bool(one.names) and all(is_distortion(case, name, names) for name in one.names)
-    return one.status in QUIET or logged
+    """Whether a report has no gap, or only what is real besides hidden effects."""
+    real = bool(one.names) and all(is_real(case, name, one, names) for name in one.names)
+    return one.status in QUIET or real
+
+
+def is_real(case: Case, name: str, one: Heard, names: CaseNames) -> bool:
+    """Whether a name is a distortion by the case's logger, or moves parameters that are truly far off."""
+    if is_distortion(case, name, names):
+        return True
+    if not case.normal or name not in names.placed:
+        return False
+    found = {key: number(item.value) for key, item in one.parameters.get(name, {}).items()}
+    plan = plans.from_tables(case.plan, Path())
+    return bool(found) and is_truly_off(case.truths, plan, names.placed[name], found, TWO_TOLERANCES)
 
 
 def is_distortion(case: Case, name: str, names: CaseNames) -> bool:
