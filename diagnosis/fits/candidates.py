@@ -39,7 +39,7 @@ def extended(fit: Fit, scales: Scales, count: int = FITTED, known: Fit | None = 
 
     def rough(candidate: ScreenedEffect) -> Fit:
         start: Values = {**fit.values, candidate.effect.name: candidate.values}
-        return fitting.fit(near.data, start, near.z, ROUGH, slopes, rounds=1)
+        return fitting.fit(near.data, start, candidate.z, ROUGH, slopes, rounds=1)
 
     def fine(item: Fit) -> Fit:
         z = np.clip(item.z, -fitting.NEAR, fitting.NEAR)

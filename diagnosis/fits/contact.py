@@ -6,6 +6,7 @@ there the fit is lengthened bit by bit, each piece starting from the parameters 
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -14,17 +15,21 @@ from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.residuals import Data
+from diagnosis.fits.screening import WORKERS
 from laboratories.effects.effect import Effect
 
 FIRST = 0.02  # of the largest residual, from which on the stop has been met
-INSIDE = 0.97  # of the largest stroke before that
+INSIDE = (0.97, 0.7)  # of the largest stroke before that, where a stiff and a soft stop may stand
 AFTER = 0.4  # s after first contact that the shortest fit covers
 LONGER = 1.3  # factor from one fit to the next
+BEYOND = (
+    30.0  # times the stroke before that: no motion that meets a stop goes so far, not even an unstable one
+)
 EVERY = 5  # of so many averaged samples one judges
 
 
 def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
-    """The fit with an end stop as well, None where the motion that meets it was not recorded or is none."""
+    """The fit with an end stop as well, None where the motion that meets it was not recorded, is none or goes on."""
     stop = effect.contact
     if stop is None or stop.motion not in data.part.signals:
         return None
@@ -34,11 +39,19 @@ def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
     bare = fitting.at(data, fit.values, np.zeros(fit.z.size))
     missed = np.max(np.abs(bare.reduced), axis=1)
     first = int(np.argmax(missed > FIRST * missed.max()))
-    reached = float(np.max(np.abs(data.part.measured[: max(1, first * data.group), place])))
-    if reached <= 0.0:
+    stroke = np.abs(data.part.measured[:, place])
+    reached = float(np.max(stroke[: max(1, first * data.group)]))
+    if reached <= 0.0 or float(np.nanmax(stroke)) > BEYOND * reached:
         return None
-    begun = ({stop.place: INSIDE * reached, stop.stiffness: stiffness} for stiffness in stop.starts)
-    fits = [grown(data, fit, first, {**fit.values, effect.name: values}) for values in begun]
+    begun = (
+        {stop.place: share * reached, stop.stiffness: stiffness}
+        for share in INSIDE
+        for stiffness in stop.starts
+    )
+    with ThreadPoolExecutor(WORKERS) as pool:
+        fits = list(
+            pool.map(lambda values: grown(data, fit, first, {**fit.values, effect.name: values}), begun)
+        )
     return min(fits, key=lambda item: item.cost)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from diagnosis.fits import hypothesis
-from diagnosis.fits.fitting import Fit
+from diagnosis.fits.fitting import NEAR, Fit
 from diagnosis.fits.scales import Scales
 from laboratories.effects.effect import Effect
 from models.registry import Array
@@ -25,6 +25,7 @@ class ScreenedEffect:
 
     effect: Effect
     values: dict[str, float]
+    z: Array  # (nuisances,) where the nominal parameters go with it, no further than fits begin
     gain: float
 
 
@@ -45,21 +46,21 @@ class Plane:
         self._low, self._high = -room - at, room - at
         self._alone = self._cost(np.zeros(size), 0.0, 0.0, (0.0, 1e-12))[0] if size else float(fit.cost)
 
-    def gain(self, change: Array, stretch: tuple[float, float]) -> tuple[float, float]:
-        """What residuals that move by a share of `change` (groups·signals,) gain at best, and that share."""
+    def gain(self, change: Array, stretch: tuple[float, float]) -> tuple[float, float, Array]:
+        """What residuals that move by a share of `change` (groups·signals,) gain at best, that share, and z there."""
         inside = self._basis.T @ change
         outside = change - self._basis @ inside
         size = float(np.linalg.norm(outside))
         if size**2 < 1e-6 and float(inside @ inside) < 1e-6:
-            return -math.inf, 0.0
+            return -math.inf, 0.0, self.fit.z
         along = float(outside @ self._off) / size if size > 0.0 else 0.0
-        cost, share = self._cost(inside, size, along, stretch)
-        return self._alone - cost, share
+        cost, share, moves = self._cost(inside, size, along, stretch)
+        return self._alone - cost, share, np.clip(self.fit.z + moves, -NEAR, NEAR)
 
     def _cost(
         self, inside: Array, size: float, along: float, stretch: tuple[float, float]
-    ) -> tuple[float, float]:
-        """Least cost over parameters and share, by a bounded linear fit of a few unknowns."""
+    ) -> tuple[float, float, Array]:
+        """Least cost over parameters and share, that share, and how z moves, by a bounded linear fit."""
         count = self.fit.z.size
         rows = [
             np.column_stack([self._slopes, inside]),
@@ -70,7 +71,7 @@ class Plane:
         low, high = np.append(self._low, stretch[0]), np.append(self._high, stretch[1])
         found = lsq_linear(np.concatenate(rows), -rest, bounds=(low, high), method="bvls")
         off = float(self._off @ self._off) - along**2
-        return 2.0 * float(found.cost) + off, float(found.x[-1])
+        return 2.0 * float(found.cost) + off, float(found.x[-1]), found.x[:count]
 
 
 def screen(fit: Fit, effects: Iterable[Effect], scales: Scales) -> list[ScreenedEffect]:
@@ -92,7 +93,7 @@ def look(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect]:
     best: dict[tuple[float, ...], ScreenedEffect] = {}
     for form, values in scales.starts(effect):
         moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: values}))
-        gain, share = plane.gain((moved - fit.reduced).ravel(), scales.stretch(effect))
+        gain, share, z = plane.gain((moved - fit.reduced).ravel(), scales.stretch(effect))
         if form not in best or gain > best[form].gain:
-            best[form] = ScreenedEffect(effect, scales.stretched(effect, values, share), gain)
+            best[form] = ScreenedEffect(effect, scales.stretched(effect, values, share), z, gain)
     return list(best.values())

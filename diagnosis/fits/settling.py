@@ -112,7 +112,7 @@ def in_white_noise(bare: Fit, scales: Scales) -> list[Fit]:
     slopes = near.jacobian[:, : bare.z.size]
     found = screen(near, white.data.part.candidates, scales)[:RIVALS]
     fits = [
-        fitting.fit(near.data, {item.effect.name: item.values}, near.z, ROUGH, slopes, rounds=1)
+        fitting.fit(near.data, {item.effect.name: item.values}, item.z, ROUGH, slopes, rounds=1)
         for item in found
     ]
     whole = [fitting.at(white.data, item.values, item.z) for item in fits]
