@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from scipy.optimize import minimize
@@ -12,6 +13,7 @@ from common.plan.kinds import COLUMN
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Problem
+from diagnosis.fits.screening import WORKERS
 from diagnosis.fits.unexplained import remaining
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
@@ -71,12 +73,13 @@ def raced(fits: list[Fit]) -> dict[str, Fit]:
     """
     firsts = {item.names[-1]: item for item in reversed(fits)}
     starts = [start for item in firsts.values() for start in begun(item)]
-    rough = sorted((fitted(start, ROUGH, 1) for start in starts), key=cost)
     least = min(map(excess, fits))
     found: dict[str, list[Fit]] = {}
-    for item in rough[:LEADING]:
-        if excess(item) <= FARTHEST * least:
-            found.setdefault(item.names[-1], []).append(fitted(item, STEPS, ROUNDS))
+    with ThreadPoolExecutor(WORKERS) as pool:
+        rough = sorted(pool.map(lambda start: fitted(start, ROUGH, 1), starts), key=cost)
+        leading = [item for item in rough[:LEADING] if excess(item) <= FARTHEST * least]
+        for item in pool.map(lambda item: fitted(item, STEPS, ROUNDS), leading):
+            found.setdefault(item.names[-1], []).append(item)
     chosen = {name: simplest(firsts[name], others) for name, others in found.items()}
     return {name: item for name, item in chosen.items() if item is not firsts[name]}
 
