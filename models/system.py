@@ -108,6 +108,8 @@ class DamperEffects:
     offset: float = 0.0  # N, a constant force on the moving mass
     stop_stroke: float = math.inf  # m
     stop_stiffness: float = 0.0  # N/m
+    stop_exponent: float = 1.0  # of the depth, as in `models.stops`
+    stop_damping: float = 0.0  # s/m
     learned: tuple[
         float, ...
     ] = ()  # a law of `models.preisach` for a force of the stroke beside the spring's, N

@@ -59,7 +59,7 @@ def extended(fit: Fit, scales: Scales, count: int = FITTED, known: Fit | None = 
         fits = sorted([*pool.map(fine, hopeful), *rest], key=lambda item: item.cost)
     if fits and remaining(fits[0]) > MATERIAL and (known is None or hopeful):
         fits[0] = fitting.fit(data, fits[0].values, fits[0].z, STEPS, rounds=3)
-    return with_stop(fit, fits)
+    return fits
 
 
 def with_stop(fit: Fit, fits: list[Fit]) -> list[Fit]:
@@ -76,7 +76,7 @@ def with_stop(fit: Fit, fits: list[Fit]) -> list[Fit]:
 
 def best_laws(fit: Fit, scales: Scales) -> list[Fit]:
     """Fits with one effect more, best first, each effect under the law of its mechanism that leaves least."""
-    return laws.in_best_laws(extended(fit, scales))
+    return laws.in_best_laws(with_stop(fit, extended(fit, scales)))
 
 
 def without(fit: Fit, name: str) -> Fit:

@@ -1,22 +1,25 @@
 """End stops: after each impact a wrong stop sends the prediction elsewhere, so fits grow with the test.
 
-The first residual tells when the stop was first met, and the largest stroke until then where it stands; from
-there the fit is lengthened bit by bit, each piece starting from the parameters of the shorter one.
+The first residual tells when the stop was first met, and the largest stroke until then where it stands; from there the
+fit is lengthened bit by bit, each piece starting from the parameters of the shorter one. Under a further law only that
+stiffness is lengthened which fits best shortly after the first contact.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.fits import fitting
+from diagnosis.fits import fitting, laws
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.screening import WORKERS
 from laboratories.effects.effect import Effect
+from models.registry import Array
 
 FIRST = 0.02  # of the largest residual, from which on the stop has been met
 INSIDE = (0.97, 0.7)  # of the largest stroke before that, where a stiff and a soft stop may stand
@@ -43,27 +46,50 @@ def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
     reached = float(np.max(stroke[: max(1, first * data.group)]))
     if reached <= 0.0 or float(np.nanmax(stroke)) > BEYOND * reached:
         return None
-    begun = (
+    groups = first + max(10, round(AFTER / (data.system.plan.test.interval * data.group)))
+    starts = [
         {stop.place: share * reached, stop.stiffness: stiffness}
         for share in INSIDE
         for stiffness in stop.starts
-    )
+    ]
     with ThreadPoolExecutor(WORKERS) as pool:
-        fits = list(
-            pool.map(lambda values: grown(data, fit, first, {**fit.values, effect.name: values}), begun)
-        )
-    return min(fits, key=lambda item: item.cost)
+        near = list(pool.map(lambda start: beginning(data, fit, effect, start, groups), starts))
+        each = len(stop.starts)
+        kept = (min(near[place : place + each], key=laws.cost) for place in range(0, len(near), each))
+        best = [item.values[effect.name] for item in kept]
+        further = [under for values in best for under in further_laws(effect, values)]
+        begun = [*starts, *further]
+        fits = list(pool.map(lambda start: grown(data, fit, effect, start, groups), begun))
+    springs = [item for item in fits if not item.values[effect.name].get("law")]
+    others = [item for item in fits if item not in springs]
+    return laws.simplest(min(springs, key=laws.cost), others)
 
 
-def grown(data: Data, fit: Fit, first: int, values: Values) -> Fit:
-    """One start, lengthened to the whole test."""
+def further_laws(effect: Effect, values: Mapping[str, float]) -> list[dict[str, float]]:
+    """Parameters of an end stop under each of its laws but the first, at the same place and as stiff."""
+    return [{**effect.under(place, values), **values} for place in range(1, len(effect.laws))]
+
+
+def beginning(data: Data, fit: Fit, effect: Effect, start: Mapping[str, float], groups: int) -> Fit:
+    """One start, fitted over so many averaged samples."""
+    values: Values = {**fit.values, effect.name: dict(start)}
+    return shorter(data, values, np.zeros(fit.z.size), groups)
+
+
+def grown(data: Data, fit: Fit, effect: Effect, start: Mapping[str, float], groups: int) -> Fit:
+    """One start, lengthened from so many averaged samples to the whole test."""
+    values: Values = {**fit.values, effect.name: dict(start)}
     z = np.zeros(fit.z.size)
-    groups = first + max(10, round(AFTER / (data.system.plan.test.interval * data.group)))
     while groups < data.groups:
-        piece = replace(
-            data, part=data.part.first(groups * data.group), train=np.arange(groups) % EVERY < EVERY - 1
-        )
-        shorter = fitting.fit(piece, values, z, steps=6, rounds=1)
-        values, z = shorter.values, shorter.z
+        piece = shorter(data, values, z, groups)
+        values, z = piece.values, piece.z
         groups = int(LONGER * groups) + 1
     return fitting.fit(data, values, z, steps=6, rounds=2)
+
+
+def shorter(data: Data, values: Values, z: Array, groups: int) -> Fit:
+    """A fit over the first averaged samples, of which some are withheld."""
+    piece = replace(
+        data, part=data.part.first(groups * data.group), train=np.arange(groups) % EVERY < EVERY - 1
+    )
+    return fitting.fit(piece, values, z, steps=6, rounds=1)

@@ -20,7 +20,7 @@ from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.systematic import systematic
 from loop import replay
-from models import friction
+from models import friction, stops
 from models.registry import Array
 from models.system import DamperEffects, System, TableEffects
 
@@ -171,9 +171,10 @@ def damper_force(system: System, stroke: Array, rate: Array, command: Array) -> 
     lag = damper.motor_time_constant
     kept = float(np.exp(-system.plan.test.interval / lag)) if lag > 0.0 else 0.0
     motor = lfilter([0.0, 1.0 - kept], [1.0, -kept], wanted)
-    over = stroke - np.clip(stroke, -effects.stop_stroke, effects.stop_stroke)
+    shape = (effects.stop_stroke, effects.stop_stiffness, effects.stop_exponent, effects.stop_damping)
+    stopped = np.vectorize(stops.force, otypes=[float])(stroke, rate, *shape)
     rubbing = bristles_of(effects, stroke) if effects.presliding else friction_of(effects, rate)
-    beside: Array = effects.stop_stiffness * over + rubbing - effects.offset
+    beside: Array = stopped + rubbing - effects.offset
     return damper.stiffness * stroke + damper.damping * rate + beside - motor
 
 

@@ -31,7 +31,7 @@ from laboratories.table.linear import (
     TABLE_RATE,
     propagation,
 )
-from models import friction, preisach
+from models import friction, preisach, stops
 from models.compiled import jit
 from models.registry import Array
 from models.system import DamperEffects, TableEffects
@@ -46,6 +46,7 @@ TABLE_SHAPE, SHAPE = 13, 16  # of the frictions: asymmetry, what speed takes of 
 PRESLIDING = 19  # m, of the rail's friction
 # of the play behind the loop: a half of it m, drag of the guide 1/s, 2ζ/ω of the flanks s, 1/ω² of them s²
 BEHIND, GUIDE, DAMPED, SOFT = 20, 21, 22, 23
+STOP_EXPONENT, STOP_DAMPING = 24, 25
 
 # places in `scratch` behind the states and inputs
 PLAYED, LAST_VELOCITY, BRISTLES = range(3)
@@ -109,7 +110,7 @@ def build(
     limits += [interval if math.isinf(table.frequency) else 0.0, on_damper.offset]
     for part in (on_table, on_damper):
         limits += [part.friction_asymmetry, part.friction_drop, part.friction_speed]
-    limits += [on_damper.presliding, *behind]
+    limits += [on_damper.presliding, *behind, on_damper.stop_exponent, on_damper.stop_damping]
     return TableLab(
         segments.taps,
         matrices,
@@ -235,9 +236,15 @@ def resist(matrix: Array, lab: TableLab, scratch: Array, length: float) -> None:
     scratch[rail] = -limits[OFFSET]
     scratch[drag] = 0.0
     middle = scratch[STROKE] + 0.5 * matrix[STROKE, STROKE_RATE] * scratch[STROKE_RATE]
-    over = abs(middle) - limits[STOP]
-    if over > 0.0:  # at the segment's middle, with which a bounce conserves energy
-        scratch[rail] += limits[STOP_STIFFNESS] * (over if middle > 0.0 else -over)
+    if abs(middle) > limits[STOP]:  # at the segment's middle, with which a bounce conserves energy
+        scratch[rail] += stops.force(
+            middle,
+            scratch[STROKE_RATE],
+            limits[STOP],
+            limits[STOP_STIFFNESS],
+            limits[STOP_EXPONENT],
+            limits[STOP_DAMPING],
+        )
     if lab.learned.size > 0:
         scratch[rail] += preisach.step(lab.learned, lab.learned_memory, middle, scratch[STROKE_RATE])
     base = BASE_RATE if size > BASE else TABLE_RATE

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp, trapezoid
+from scipy.optimize import brentq
 
 from common.plan.laboratory_tables import Damper, ShakingTable
 from common.plan.plan import Plan
@@ -216,6 +217,30 @@ def test_the_end_stop_acts_as_an_elastic_spring(stiffness: float, tolerance: flo
     beyond = np.maximum(np.abs(stroke) - stop, 0.0)
     # the force is held over a short step, in which the stroke moves on by as much as speed·0.25 ms
     assert np.max(np.abs(np.abs(force) - stiffness * beyond)) < stiffness * abs(speed) * SHORT * 1.01
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize(("exponent", "damping"), [(1.5, 0.0), (1.5, 1.0), (1.2, 0.3), (1.0, 2.0)])
+def test_the_contact_of_hunt_and_crossley_goes_as_deep_and_returns_as_slowly_as_it_must(
+    exponent: float, damping: float, direction: float
+) -> None:
+    """From m·v·dv/dd = −K·d·(d/d₀)^(n−1)·(1 + λ·v): G(v) = v/λ − ln(1 + λ·v)/λ² is the same before and after."""
+    speed, stiffness, stop = 0.5, 2000.0, 0.02
+
+    def energy(v: float) -> float:
+        return v / damping - math.log1p(damping * v) / damping**2 if damping else 0.5 * v**2
+
+    away = brentq(lambda v: energy(-v) - energy(speed), 0.0, min(speed, 0.999 / (damping or 1.0)))
+    work = 16.0 * energy(speed) * (exponent + 1.0) * 1e-3 ** (exponent - 1.0) / stiffness
+    more = DamperEffects(
+        stop_stroke=stop, stop_stiffness=stiffness, stop_exponent=exponent, stop_damping=damping
+    )
+    got = released(FREE, more, 0.5, rate=speed * direction)
+    assert np.max(np.abs(got[:, 0])) == pytest.approx(stop + work ** (1.0 / (exponent + 1.0)), rel=5e-3)
+    left = np.flatnonzero((np.abs(got[:, 0]) < stop - 2e-3) & (got[:, 1] * direction < 0.0))
+    assert got[left[0], 1] == pytest.approx(-away * direction, rel=0.01)
+    pushed = got[:, 2] * np.sign(got[:, 0])
+    assert np.min(pushed) >= 0.0
 
 
 @pytest.mark.parametrize(

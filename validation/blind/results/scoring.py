@@ -126,11 +126,8 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
         if (one := report_on(item, heard)) and one.site in right_sites(item, one, names)
     ]
     truth = [names.effect(item) for item in case.laid]
-    own = [
-        name
-        for name in verdict
-        if name in truth or not any(is_real(case, name, one, names) for one in heard if name in one.names)
-    ]
+    real = {name for one in heard for name in one.names if is_real(case, name, one, names)}
+    own = [name for name in verdict if name in truth or name not in real]
     right_names = {name for item in case.laid for name in truths(item, names)}
     wrong = [name for name in own if not any(same(item, name, sets) for item in right_names)]
     asked_for = visible(case, recorded)
