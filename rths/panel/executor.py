@@ -119,7 +119,11 @@ class PanelExecutor:
         self._shown: Shown | None = None
         self._sought = 0.0
         self._closing = threading.Event()
+        self._unsettled: list[Future[OrderOutcome]] = []
         self._ended = False
+        self._handing = (
+            threading.Lock()
+        )  # over both of these: an order is settled at the end, or finds it ended
         self._opener = ThreadPoolExecutor(1)
         self._thread = threading.Thread(target=self._run, name="executor")
         self._thread.start()
@@ -141,9 +145,11 @@ class PanelExecutor:
     def carry_out(self, word: str, digest: str, reason: str) -> Future[OrderOutcome]:
         """Begin with an order at the next turn."""
         settled: Future[OrderOutcome] = Future()
-        if self._ended:
-            settled.set_result(OVER)
-            return settled
+        with self._handing:
+            if self._ended:
+                settled.set_result(OVER)
+                return settled
+            self._unsettled = [one for one in self._unsettled if not one.done()] + [settled]
         self._queue.put(Job(word, digest, reason, settled, time.monotonic() + PATIENCE_S))
         return settled
 
@@ -166,17 +172,15 @@ class PanelExecutor:
             while not self._closing.is_set():
                 self._turn()
         finally:
-            self._ended = True
             self._let_go()
 
     def _let_go(self) -> None:
         """Leave no order without an outcome, no check and no link behind."""
-        jobs = [*self._waiting, *self._given.values(), *(job for _, job in self._checks.values())]
-        jobs += [self._arming] if self._arming else []
-        while not self._queue.empty():
-            jobs.append(self._queue.get())
-        for job in jobs:
-            job.settled.set_result(OVER)
+        with self._handing:
+            self._ended = True
+        for settled in self._unsettled:
+            if not settled.done():
+                settled.set_result(OVER)
         for check, _ in self._checks.values():
             check.end()
         if self._test is not None:

@@ -259,6 +259,32 @@ def test_if_the_panels_executor_fails_every_order_still_gets_an_outcome(
     assert len(failed) == 1
 
 
+def test_an_order_that_is_being_handed_over_when_the_executor_fails_gets_an_outcome(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("threading.excepthook", lambda found: None)
+    executor = desk.executor
+    put = executor._queue.put
+
+    def put_late(job: Any) -> None:
+        """The executor ends between the decision to hand an order over and its arrival."""
+        monkeypatch.setattr(executor, "_seek", lambda: 1 / 0)
+        executor._thread.join(HANG_S)
+        put(job)
+
+    monkeypatch.setattr(executor._queue, "put", put_late)
+    assert desk.give("stop").state == "not heard"
+
+
+@pytest.mark.parametrize("step", ["_begin", "_exchange"])
+def test_an_order_in_whose_midst_the_executor_fails_gets_an_outcome(
+    step: str, desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("threading.excepthook", lambda found: None)
+    monkeypatch.setattr(desk.executor, step, lambda *_: 1 / 0)
+    assert desk.give("stop").state == "not heard"
+
+
 def test_a_panel_that_ends_stops_an_armed_test_and_leaves_a_running_one(
     desk: Desk, program: Callable[[str], list[list[str]]]
 ) -> None:
