@@ -21,6 +21,9 @@ IDLE_NS = 5_000_000
 # How long the closing messages are repeated where the recorder is not waited for: five leases of the link, within which
 # a connection that broke is noticed and opened again.
 LEAVE_NS = 5_000_000_000
+# How long a laboratory stays after its last answer to an operator, who asks again every 100 ms while one is missing.
+# Two such times and a half: without it, half of the emergency stops from the panel lost the slave's answer on its way.
+ANSWERED_NS = 250_000_000
 PROGRESS_NS = 200_000_000  # between two reports of progress: five a second are as many as a user can read
 RESTING_NS = (
     500_000_000  # between two reports of the ramp to rest, which takes a few seconds at most by default
@@ -231,12 +234,13 @@ def leave(loop: DrivenLoop, over: int) -> None:
     Meanwhile the recorder may ask for samples that it lacks.
     The recorder's patience counts from when it was last heard, as during the test, and `LEAVE_NS` is added for it to
     come back to the link and ask. A laboratory that routes for others stays while they come to rest, at most for the
-    longest ramp to rest after the time `over` (ns) of the last tick; the recorder's time counts from then.
+    longest ramp to rest after the time `over` (ns) of the last tick; the recorder's time counts from then. One that has
+    answered an operator stays for a repetition of the order, because its answer, or one that it forwards, may be lost.
     """
     lab = loop.lab
     begun, patience = lab.clock.now(), round(lab.plan.recording.patience * 1e9)
     rest = over + round(loop.others_rest * 1e9) if lab.start_ns else begun
-    while (routes := coming_to_rest(loop, rest)) or not loop.left:
+    while (routes := coming_to_rest(loop, rest)) or not loop.left or answering(lab):
         if routes:
             begun = lab.clock.now()
         heard = lab.recorder_heard_ns if lab.recorded else begun - patience
@@ -245,6 +249,11 @@ def leave(loop: DrivenLoop, over: int) -> None:
         loop.leave()
         fetch(loop, lab.clock.now() + IDLE_NS)
     loop.leave(last=True)
+
+
+def answering(lab: Laboratory) -> bool:
+    """Whether an operator may not have received this laboratory's answer yet, and ask again."""
+    return lab.answered_ns is not None and lab.clock.now() - lab.answered_ns < ANSWERED_NS
 
 
 def coming_to_rest(loop: DrivenLoop, rest: int) -> bool:

@@ -59,6 +59,7 @@ class Laboratory:
         self.tick = 0  # the newest one that has begun
         self.until = setting.plan.ticks  # ticks of the test, more than the plan's where it is held
         self.answers: dict[int, tuple[bool, str]] = {}  # by the operator's press: accepted, and a sentence
+        self.answered_ns: int | None = None  # when it last answered an operator
         self._exact_ns = setting.plan.test.interval * 1e9
         self.interval_ns = round(self._exact_ns)
         self.loss_ns = setting.plan.link.loss_timeout * 1e9  # silence after which a role counts as lost

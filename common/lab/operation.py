@@ -77,6 +77,7 @@ def obey(loop: Operated, wish: Operator) -> None:
         why = f" ({wish.reason})" if wish.reason else ""
         lab.note("operator", f"{wish.word}{why}: {lab.answers[wish.press][1]}", tick=lab.tick)
     accepted, text = lab.answers[wish.press]
+    lab.answered_ns = lab.clock.now()
     lab.endpoint.send(Answer(0, wish.press, int(accepted), text))
 
 

@@ -298,12 +298,20 @@ class PanelExecutor:
         process = own if own in found else next(reversed(found), 0) if not own else 0
         entry = found.get(process)
         if self._test is not None and (entry is None or named(entry.test, process) != self._test.name):
-            self._test.close()
-            self._test = None
+            self._leave_test(self._test)
         if entry is not None and self._test is None:
             with contextlib.suppress(RthsError):  # its plan needs what is not there any more
                 self._test = RunningTest(process, entry, self._opener)
                 self._same_plan(self._test)
+
+    def _leave_test(self, test: RunningTest) -> None:
+        """Let a test that has ended go; what was answered until then is told."""
+        if test.orders is not None:
+            self._look(test.orders, 0.0)
+            for given in test.orders.unsettled:
+                self._given.pop(given.wish.press).settled.set_result(unanswered(given))
+        test.close()
+        self._test = None
 
     def _same_plan(self, test: RunningTest) -> None:
         """End a test of the panel's own whose plan is not the one that was checked and shown."""
@@ -328,18 +336,16 @@ class PanelExecutor:
                 self._waiting.remove(job)
                 job.settled.set_result(OrderOutcome(UNHEARD, "There is no link to the laboratories."))
         if orders is not None:
-            for given in orders.look(TURN_S if self._given else 0.0):
-                job = self._given.pop(given.wish.press)
-                found = outcome(given)
-                if job.interrupted and found.state == UNHEARD:
-                    found = OrderOutcome(UNHEARD, f"{found.text} {INTERRUPTED}")
-                job.settled.set_result(found)
-        elif self._given:
-            for job in self._given.values():
-                job.settled.set_result(
-                    OrderOutcome(UNHEARD, "The test ended before all laboratories had answered.")
-                )
-            self._given = {}
+            self._look(orders, TURN_S if self._given else 0.0)
+
+    def _look(self, orders: Outstanding, timeout: float) -> None:
+        """Settle the orders whose answers have come, or have not come in time."""
+        for given in orders.look(timeout):
+            job = self._given.pop(given.wish.press)
+            found = outcome(given)
+            if job.interrupted and found.state == UNHEARD:
+                found = OrderOutcome(UNHEARD, f"{found.text} {INTERRUPTED}")
+            job.settled.set_result(found)
 
     def _present_test(self) -> Shown | None:
         """The test that the pages show."""
@@ -380,15 +386,28 @@ def named(test: str, process: int) -> str:
 
 def outcome(given: Given) -> OrderOutcome:
     """What became of an order to the laboratories."""
-    answers = [
+    if given.silent:
+        complaint = f"No answer came from the {silent(given)} within {PATIENCE_S:g} s."
+        return OrderOutcome(UNHEARD, " ".join([complaint, *answers(given)]))
+    accepted = all(one.accepted for one in given.answers.values())
+    return OrderOutcome(DONE if accepted else REFUSED, " ".join(answers(given)))
+
+
+def unanswered(given: Given) -> OrderOutcome:
+    """What is known of an order to a test that ended before all laboratories had answered."""
+    complaint = f"The test ended before an answer came from the {silent(given)}."
+    return OrderOutcome(UNHEARD, " ".join([complaint, *answers(given)]))
+
+
+def silent(given: Given) -> str:
+    """The laboratories that have not answered, in words."""
+    return " and the ".join(map(title, given.silent))
+
+
+def answers(given: Given) -> list[str]:
+    """The answers that have come, a sentence each."""
+    return [
         f"{title(role)}: {'' if one.accepted else 'refused: '}{one.text}"
         for role in given.due
         if (one := given.answers.get(role)) is not None
     ]
-    if given.silent:
-        who = " and the ".join(map(title, given.silent))
-        return OrderOutcome(
-            UNHEARD, " ".join([f"No answer came from the {who} within {PATIENCE_S:g} s.", *answers])
-        )
-    accepted = all(one.accepted for one in given.answers.values())
-    return OrderOutcome(DONE if accepted else REFUSED, " ".join(answers))

@@ -161,6 +161,11 @@ class Outstanding:
         self._given[wish.press] = Given(wish, ORDERS[word].answered_by(self._plan.roles))
         return wish.press
 
+    @property
+    def unsettled(self) -> list[Given]:
+        """The orders whose answers are awaited."""
+        return list(self._given.values())
+
     def look(self, timeout: float) -> list[Given]:
         """Send what is due, take the answers that come within `timeout` s; returns the orders that are settled."""
         now = time.monotonic()

@@ -12,12 +12,13 @@ import pytest
 from common.errors import EmergencyStopError, RigError
 from common.link.endpoint import Received
 from common.plan.plan import Plan
-from common.protocol.messages import Answer, Operator
+from common.protocol.messages import Answer, Message, Operator
 from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
 from common.safety.modes import Mode
 from report.facts.accounts import accounts
+from rths.perform.operate import REPEAT_S
 from simulation import virtual
 from simulation.virtual import VirtualTest
 from tests.faults.rows import motion_after, motion_bound
@@ -221,3 +222,37 @@ def test_every_sent_message_is_counted_as_used(short_plan: Plan, tmp_path: Path)
     whole = {"sent": ticks, "used": ticks, "rejected": 0, "lost": 0, "foreign": 0}
     assert found["slave/commands"] == whole
     assert found["slave/feedbacks"] == whole
+
+
+def test_a_laboratory_that_has_answered_an_operator_stays_for_a_repetition_of_the_order(
+    short_plan: Plan,
+) -> None:
+    plan = without_recorder(short_plan)
+    bench, presses = virtual.assemble(plan, reality.as_planned(plan), None), [0]
+    slave, answers = bench.slave, list[Answer]()
+    ticking, leaving, sending = slave.tick, slave.leave, slave.lab.endpoint.send
+
+    def press() -> None:
+        presses.append(bench.world.time)
+        wish = Operator(0, plan.digest(), "emergency", 77, "smoke")
+        slave.take(Received(wish, "operator", bench.world.time))
+
+    def tick(number: int) -> None:
+        if number == TRIP:
+            press()
+        ticking(number)
+
+    def leave(*, last: bool = False) -> None:
+        if len(presses) == 2 and bench.world.time - presses[1] >= REPEAT_S * 1e9:
+            press()
+        leaving(last=last)
+
+    def send(message: Message, to: str = "") -> int:
+        if isinstance(message, Answer):
+            answers.append(message)
+        return sending(message, to)
+
+    slave.tick, slave.leave, slave.lab.endpoint.send = tick, leave, send  # type: ignore[method-assign, assignment]
+    assert isinstance(virtual.run(bench, str), EmergencyStopError)
+    assert answers == [Answer(0, 77, 1, "emergency_stop.")] * 2
+    assert bench.world.time - presses[-1] < 2e9
