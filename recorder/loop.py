@@ -216,9 +216,9 @@ class RecorderLoop:
         )
         if failure and not self._said_failure:
             self._said_failure = True
-            self._report(
-                "event", {"lab": "recorder", "level": "error", "code": "recording_lost", "text": failure}
-            )
+            refused = isinstance(self.error, InputError)
+            code = "recording_lost" if self._sink.failure else "refused" if refused else "lost"
+            self._report("event", {"lab": RECORDER, "level": "error", "code": code, "text": failure})
         nexts = pack_nexts({lab: inlet.next for lab, inlet in self._inlets.items()})
         self._endpoint.send(Recorder(self._session, state, self._said, failure or self._wish, nexts))
 

@@ -17,6 +17,7 @@ class Stopping(Protocol):
     """A request to stop as a loop sees it."""
 
     presses: int  # how often it was made
+    number: signal.Signals  # by which it was made first
 
     def __call__(self) -> str:
         """The reason, empty while there is none."""
@@ -32,12 +33,15 @@ class Stopper:
     def __init__(self, answer: Callable[[], str] | None = None) -> None:
         self.answer = answer
         self.presses = 0
+        self.number = signal.SIGINT
         self._reason = ""
         self._before = {number: signal.signal(number, self._caught) for number in taken()}
 
     def _caught(self, number: int, _frame: FrameType | None) -> None:
         self.presses += 1
-        self._reason = self._reason or f"stopped by the user ({signal.Signals(number).name})."
+        if not self._reason:
+            self.number = signal.Signals(number)
+            self._reason = f"stopped by the user ({self.number.name})."
         if self.presses > 1 and self.answer is not None:
             with contextlib.suppress(Exception):  # no failure of this message may reach the loop as an error
                 os.write(STDERR, f"{self.answer()}\n".encode())

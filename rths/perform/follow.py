@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 from common.host.stopping import Stopping
 from common.lab.preflight import PASSED
 from common.protocol.exchange import State
-from common.roles import MASTER, title
+from common.roles import MASTER, RECORDER, title
 from common.safety.modes import Mode
 from report.text.forwarded import ForwardedProgress
 from report.text.terminal import RunProgress
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 POLL_S = 0.1  # s between two looks at the processes: a user does not notice the delay
 AGREED = State.SCHEDULED.value  # state in which the master reports that all processes know the start
+UNWRITABLE = "recording_lost"  # code of the only event with which a recorder ends a test
 # Codes of events that go into the recording only: the terminal shows them before the start or in the summary.
 UNSAID = ("patience", "machine", "bare_loop", "mode", "exchange", PASSED)
 
@@ -49,7 +51,7 @@ def follow(
             progress.alive([name for name in processes.names if name not in processes.ended()])
         if view is not None and (news := view.news()):
             progress.say(news)
-        for name in stop(processes, ending, stopping()):
+        for name in stop(processes, ending, stopping(), stopping.number):
             progress.say(killed(name))
         if stopping.presses > answered:
             answered = stopping.presses
@@ -98,7 +100,7 @@ def end_all(processes: Processes, ending: Ending) -> None:
     while not processes.all_ended():
         if (said := processes.said(POLL_S)) is not None:
             note(said, ending, doing)
-        stop(processes, ending, "this program failed.")
+        stop(processes, ending, "this program failed.", signal.SIGINT)
 
 
 def tell(said: Said, progress: RunProgress | ForwardedProgress) -> None:
@@ -113,6 +115,10 @@ def tell(said: Said, progress: RunProgress | ForwardedProgress) -> None:
             progress.mode(lab, mode)
         case {"kind": "event", "code": "real_time", "missing": missing} if missing:
             pass  # pre-flight reported it if there is a rig; an emulation does not need it
+        case {"kind": "event", "level": "error", "code": code, "lab": lab, "text": text} if (
+            lab == RECORDER and code != UNWRITABLE
+        ):
+            progress.say(f"{lab}: {text}")  # a consequence of the end, or rows that are missing
         case {"kind": "event", "level": "error", "code": code, "lab": lab}:
             progress.say(f"{lab}: ends the test ({code})")  # the full sentence is this command's last line
         case {"kind": "event", "code": code, "lab": lab, "text": text} if code not in UNSAID:
@@ -123,14 +129,17 @@ def tell(said: Said, progress: RunProgress | ForwardedProgress) -> None:
             pass
 
 
-def stop(processes: Processes, ending: Ending, wish: str) -> list[str]:
-    """Ask or kill the processes whose time has come; names of those that were killed."""
+def stop(processes: Processes, ending: Ending, wish: str, number: signal.Signals) -> list[str]:
+    """Ask or kill the processes whose time has come; names of those that were killed.
+
+    They are asked by the signal `number` with which this command was asked, so that a recording names that one.
+    """
     gone = []
     now, ended = time.monotonic(), processes.ended()
     ending.look(now, wish, processes.names, ended)
     for name in processes.names:
         if name not in ended and now >= ending.ask_at(name):
-            processes.ask(name)
+            processes.ask(name, number)
         if name not in ended and now >= ending.kill_at(name):
             processes.kill(name)
             gone.append(name)

@@ -197,11 +197,11 @@ class Processes:
         """The processes that were started."""
         return tuple(self._running)
 
-    def ask(self, name: str) -> None:
-        """Ask one process to stop in order, once."""
+    def ask(self, name: str, number: signal.Signals) -> None:
+        """Ask one process to stop in order by a signal, once."""
         if name not in self.asked and self._running[name].poll() is None:
             self.asked.add(name)
-            self._running[name].send_signal(signal.SIGINT)
+            self._running[name].send_signal(number)
 
     def kill(self, name: str) -> None:
         """End one process at once."""

@@ -22,7 +22,7 @@ from common.safety.ramp import MotionRamp
 from laboratories.longest import resting
 from report.text.terminal import RunProgress
 from rths.perform.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
-from rths.perform.follow import answer, follow, note
+from rths.perform.follow import answer, follow, note, tell
 from rths.perform.processes import Leash, Processes, Said, understood
 
 NAMES = ("master", "slave", "recorder")
@@ -218,11 +218,21 @@ def processes(tmp_path: Path, monkeypatch: Any) -> Any:
     running.close()
 
 
+def test_what_the_recorder_says_of_a_lost_test_is_no_cause_of_its_end(capsys: Any) -> None:
+    event = EVENT | {"lab": "recorder", "text": "The laboratories fell silent; the recording ends there."}
+    tell(Said("recorder", event), RunProgress(1.0))
+    tell(Said("recorder", event | {"code": "recording_lost", "text": "No space is left."}), RunProgress(1.0))
+    assert capsys.readouterr().err.splitlines() == [
+        "recorder: The laboratories fell silent; the recording ends there.",
+        "recorder: ends the test (recording_lost)",
+    ]
+
+
 class Presses:
     """A request to stop that was made this many times."""
 
     def __init__(self, reason: str = "", presses: int = 0) -> None:
-        self.reason, self.presses = reason, presses
+        self.reason, self.presses, self.number = reason, presses, signal.SIGINT
 
     def __call__(self) -> str:
         return self.reason

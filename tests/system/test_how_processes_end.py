@@ -20,20 +20,23 @@ from tests.processes import HANG_S
 from tests.system.started import crew, finish, free_port, gone, plan_file, start, wait_for_ticks
 
 
-def test_ctrl_c_stops_a_run_in_order_and_keeps_the_recording(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_stops_a_run_in_order_and_the_recording_names_it(
+    number: signal.Signals, tmp_path: Path
+) -> None:
     path = tmp_path / "stopped.mcap"
     process = start("run", patient(path.parent), "--duration", "60", "-o", path)
     wait_for_ticks(path)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     code, out, err = finish(process)
     assert code == 3, err
-    assert "stopped by the user" in err
+    assert err.endswith(f"rths: stopped by the user ({number.name}).\n")
     assert "Traceback" not in out + err
     recording = read(path)
     assert recording.finished
     assert 0 < recording.ticks("master") < 30_000
     assert recording.ticks("slave") == pytest.approx(recording.ticks("master"), abs=200)
-    assert "stopped by the user" in recording.metadata["summary"]["cause"]
+    assert recording.metadata["summary"]["cause"] == f"stopped by the user ({number.name})."
 
 
 def test_after_the_run_command_is_killed_the_test_ends_in_order(tmp_path: Path) -> None:

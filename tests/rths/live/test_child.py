@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import socket
 import time
 import urllib.request
@@ -87,16 +88,18 @@ class Test:
     def said(self, _timeout: float) -> None:
         return None
 
-    def ask(self, name: str) -> None:
-        raise AssertionError(name)
+    def ask(self, name: str, number: signal.Signals) -> None:
+        raise AssertionError(name, number)
 
-    kill = ask
+    def kill(self, name: str) -> None:
+        raise AssertionError(name)
 
 
 class Unwished:
     """No request to stop."""
 
     presses = 0
+    number = signal.SIGINT
 
     def __call__(self) -> str:
         return ""
