@@ -53,4 +53,9 @@ class Snapshot(NamedTuple):
     shown: Shown | None = None
     plan: CheckResult = CheckResult()
     machine: CheckResult = CheckResult()
-    last: tuple[tuple[str, str], ...] = ()  # who ended the newest test that this panel started, and why
+    last: tuple[
+        tuple[str, str], ...
+    ] = ()  # which laboratories said why the newest test of this panel's ended
+    ending: str = (
+        ""  # the sentence with which the command of that test ended, empty where it ended as planned
+    )

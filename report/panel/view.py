@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from common.host.clock import Clock
-from common.roles import MASTER, name_of, title
+from common.roles import MASTER, RECORDER, name_of, title
 from common.safety.modes import LATCHED, Mode
 from report.live.feed import Feed
 from report.live.levels import limits
@@ -46,6 +46,8 @@ class PanelView:
             "test": self._test(shown, feed) if shown else None,
             "phase": phase(snapshot, labs, feed),
             "labs": labs,
+            "recorder": self._recorder(shown) if shown else [],
+            "recorded": feed.changes > 0,
             "causes": causes(snapshot, feed),
             "bars": list(bars(feed)),
             "plan": self._plan(snapshot),
@@ -99,6 +101,15 @@ class PanelView:
         words = mode.replace("_", " ")
         loud = "bad" if mode == GONE else LOUD.get(mode, "")
         return {"role": role, "title": title(role), "mode": words, "loud": loud, "age": age, "note": note}
+
+    def _recorder(self, shown: Shown) -> list[dict[str, Any]]:
+        """The recorder's process where this panel has started the test: one row, none before it is known."""
+        alive = shown.reports.alive
+        if not shown.reports.alive_at:
+            return []
+        mode = "recording" if RECORDER in alive else GONE if alive else LEFT
+        row = {"role": RECORDER, "title": title(RECORDER), "mode": mode, "note": ""}
+        return [row | {"loud": "bad" if mode == GONE else "", "age": self._seconds(shown.reports.alive_at)}]
 
     def _plan(self, snapshot: Snapshot) -> dict[str, Any]:
         """The plan that can be armed, as `rths check` describes it."""
@@ -156,7 +167,8 @@ class PanelView:
 def phase(snapshot: Snapshot, labs: list[dict[str, Any]], feed: Feed) -> str:
     """The state of everything in a few words: that of the laboratory that is farthest from running."""
     if snapshot.shown is None:
-        return f"No test runs. The last one {feed.state}" if feed.ended else "No test runs"
+        ended = f"ended: {snapshot.ending}" if snapshot.ending else feed.state if feed.ended else ""
+        return f"No test runs. The last one {ended}" if ended else "No test runs"
     modes = {lab["mode"] for lab in labs}
     if GONE in modes or modes == {LEFT}:
         return "a laboratory has no process" if GONE in modes else "the laboratories have left"

@@ -17,16 +17,15 @@ from typing import NamedTuple
 
 from common.errors import RthsError
 from common.host import running
-from common.host.running import Running
 from common.lab.operation import EMERGENCY, STOP
 from common.plan.plan import Plan
-from common.plan.read import parse
 from common.roles import title
 from report.panel.desk import DONE, REFUSED, UNHEARD, OrderOutcome, Present
 from report.panel.snapshot import CheckResult, RunReports, Shown, Snapshot
 from report.panel.words import ARM, CHECK, MACHINE
 from rths.panel.child import Check, RunCommand
-from rths.perform.operate import PATIENCE_S, Given, OperatorLink, Outstanding, operator_link
+from rths.panel.running_test import RunningTest, named
+from rths.perform.operate import PATIENCE_S, Given, Outstanding
 
 TURN_S = 0.01  # s between two turns while answers are awaited
 IDLE_S = 0.05  # s between two turns while none is; a new order ends the wait at once
@@ -58,48 +57,6 @@ class Options(NamedTuple):
     doctor: Sequence[str]  # options of `rths doctor`
 
 
-class RunningTest:
-    """A test on this machine, and the operator's link to it once that is open.
-
-    zenoh keeps the open link: it dials the master again after an interruption, so that the same link carries orders
-    then. `linked` says whether it does at present.
-    """
-
-    def __init__(self, process: int, entry: Running, opener: ThreadPoolExecutor) -> None:
-        self.entry = entry
-        self.plan = parse(entry.plan, Path(entry.folder))
-        self.digest = self.plan.digest()
-        self.name = named(entry.test, process)
-        self.orders: Outstanding | None = None
-        self.linked = False  # whether the master is connected to the link
-        self.unlinked_at = 0  # when it ceased to be connected, own clock, ns; 0 where it did not
-        self._link: OperatorLink | None = None
-        self._opener = opener
-        self._opening: Future[OperatorLink] | None = None
-
-    def follow(self) -> None:
-        """Open the link, attempt after attempt, and then see whether the master is connected."""
-        if self._link is not None:
-            linked = self._link.connected()
-            if linked != self.linked:
-                self.linked, self.unlinked_at = linked, 0 if linked else time.monotonic_ns()
-        elif self._opening is None:
-            self._opening = self._opener.submit(operator_link, self.plan, self.entry.endpoint)
-        elif self._opening.done():
-            opening, self._opening = self._opening, None
-            with contextlib.suppress(RthsError):  # the master does not listen yet
-                self._link = opening.result()
-                self.orders = Outstanding(self._link.endpoint, self.plan)
-                self.linked = True
-
-    def close(self) -> None:
-        """Close the link."""
-        if self._opening is not None:
-            self._opening.add_done_callback(closed)
-        if self._link is not None:
-            self._link.endpoint.close()
-
-
 class PanelExecutor:
     """The panel's executor; `snapshot` and `present` may be read from any thread."""
 
@@ -116,6 +73,7 @@ class PanelExecutor:
         self._checks: dict[str, tuple[Check, Job]] = {}
         self._checked = {CHECK: CheckResult(), MACHINE: CheckResult()}
         self._last: tuple[tuple[str, str], ...] = ()
+        self._ending = ""
         self._shown: Shown | None = None
         self._sought = 0.0
         self._closing = threading.Event()
@@ -134,7 +92,9 @@ class PanelExecutor:
     def snapshot(self) -> Snapshot:
         """Everything at this moment."""
         checked = self._checked
-        return Snapshot(self._options.file, self._shown, checked[CHECK], checked[MACHINE], self._last)
+        return Snapshot(
+            self._options.file, self._shown, checked[CHECK], checked[MACHINE], self._last, self._ending
+        )
 
     @property
     def present(self) -> Present:
@@ -251,7 +211,7 @@ class PanelExecutor:
             job.settled.set_result(OrderOutcome(REFUSED, complaint))
             return
         self._arming = job
-        self._last = ()
+        self._last, self._ending = (), ""
         self._command = RunCommand([*self._options.plan, *self._options.run])
 
     def _not_to_arm(self, job: Job) -> str:
@@ -280,8 +240,8 @@ class PanelExecutor:
             )
         if command.over:
             reports = command.reports
-            ended = reports.lines[-1:] if command.code else ()
-            self._last = reports.causes or tuple(("the test's command", text) for text in ended)
+            self._last = reports.causes
+            self._ending = " ".join(reports.lines[-1:]) if command.code else ""
             self._command = None
             if arming is not None and self._arming is not None:
                 self._arming = None
@@ -303,6 +263,8 @@ class PanelExecutor:
             with contextlib.suppress(RthsError):  # its plan needs what is not there any more
                 self._test = RunningTest(process, entry, self._opener)
                 self._same_plan(self._test)
+                if process != own:
+                    self._last, self._ending = (), ""
 
     def _leave_test(self, test: RunningTest) -> None:
         """Let a test that has ended go; what was answered until then is told."""
@@ -371,17 +333,6 @@ class PanelExecutor:
         return Shown(
             named(name, command.process), name, self._armed, self._digest, None, True, False, command.reports
         )
-
-
-def closed(opening: Future[OperatorLink]) -> None:
-    """Close a link that was opened too late to be used."""
-    if opening.exception() is None:
-        opening.result().endpoint.close()
-
-
-def named(test: str, process: int) -> str:
-    """The name of a test that no other on this machine has had lately."""
-    return f"{test}-{process}"
 
 
 def outcome(given: Given) -> OrderOutcome:

@@ -181,7 +181,9 @@ def test_arming_starts_a_run_command_and_reports_when_all_laboratories_are_armed
         desk.give("stop").state == "done"
     )  # its laboratories are not linked, so that the command is interrupted
     until(lambda: desk.executor.snapshot.shown is None)
-    assert desk.executor.snapshot.last == (("the test's command", "Stopped by SIGINT."),)
+    assert (desk.executor.snapshot.last, desk.executor.snapshot.ending) == ((), "Stopped by SIGINT.")
+    with StandIn(desk.plan).there():  # another test
+        until(lambda: desk.executor.snapshot.ending == "")
 
 
 def test_a_command_that_ends_before_all_are_armed_gives_its_reason(
@@ -218,7 +220,7 @@ def test_a_test_with_another_plan_than_the_checked_one_is_ended_before_anything_
     monkeypatch.setattr("common.host.running.os.getpid", lambda: int(own.test.rpartition("-")[2]))
     with other.there():
         assert "the test is ended before anything moves" in arming.result(HANG_S).text
-        until(lambda: desk.executor.snapshot.last)
+        until(lambda: desk.executor.snapshot.ending)
 
 
 @pytest.mark.parametrize(

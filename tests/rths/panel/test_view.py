@@ -129,6 +129,27 @@ def test_a_process_that_ended_is_shown_as_lost_or_as_left_in_order(watched: Watc
     assert [lab["mode"] for lab in watched.state()["labs"]] == ["left", "left"]
 
 
+def test_a_recorder_without_a_process_is_shown_while_laboratories_run(watched: Watched) -> None:
+    def recorder() -> list[tuple[str, str]]:
+        return [(one["mode"], one["loud"]) for one in watched.state()["recorder"]]
+
+    assert recorder() == []
+    watched.tell(alive=("master", "slave", "recorder"), master="running", slave="running")
+    assert recorder() == [("recording", "")]
+    watched.tell(alive=("master", "slave"))
+    assert recorder() == [("no process", "bad")]
+    watched.tell(alive=())
+    assert recorder() == [("left", "")]
+
+
+def test_after_a_test_of_the_panels_own_its_commands_last_sentence_is_shown(watched: Watched) -> None:
+    watched.shown = None
+    ending = "The slave was killed (signal 9); the recording holds the rows until then."
+    state = watched.state(ending=ending, last=(("master", "The slave has been silent for 5 s."),))
+    assert state["phase"] == f"No test runs. The last one ended: {ending}"
+    assert [one["text"] for one in state["causes"]] == ["The slave has been silent for 5 s."]
+
+
 def test_a_lost_link_has_its_age_until_the_recording_has_ended(watched: Watched) -> None:
     assert watched.shown is not None
     assert watched.state()["test"]["unlinked"] is None
