@@ -57,11 +57,14 @@ class Page:
 
 
 @contextlib.contextmanager
-def open_page(url: str, width: int = 1280, height: int = 900) -> Iterator[Page]:
-    """A page (http or file) in a window of `width` by `height` CSS pixels, until the end of the block."""
+def open_page(url: str, width: int = 1280, height: int = 900, program: Path | None = None) -> Iterator[Page]:
+    """A page (http or file) in a window of `width` by `height` CSS pixels, until the end of the block.
+
+    `program` is started in place of the browser: it may start that elsewhere.
+    """
     with sync_playwright() as library:
         browser = library.chromium.launch(
-            executable_path=chromium(), args=list(OPTIONS), timeout=LIMIT_S * 1e3
+            executable_path=program or chromium(), args=list(OPTIONS), timeout=LIMIT_S * 1e3
         )
         try:
             page = Page(browser.new_page(viewport={"width": width, "height": height}))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,10 +12,11 @@ from common.plan.plan import Plan
 from common.plan.read import with_test
 from common.recording.reader import read
 from report.panel.words import WORDS
-from tests.browser import Page, chromium, open_page
+from tests.browser import chromium, open_page
 from tests.helpers import PATIENT
-from tests.processes import HANG_S, environment
+from tests.processes import HANG_S
 from tests.rths.panel.stand_in import StandIn, elsewhere
+from tests.system.panels import ENABLED, LINKED, ORDERS, Panels, press
 
 pytestmark = [
     pytest.mark.slow,
@@ -26,7 +25,6 @@ pytestmark = [
 
 PRESSES = 1000
 NARROW = 390  # of a telephone's screen, CSS pixels
-LINKED = "document.getElementById('test').textContent.includes(', linked')"
 PRESS = """(count) => { const button = document.querySelector("button[data-word=stop]");
   for (let press = 0; press < count; press++) button.click(); }"""
 # what becomes of every order of the page, from the answers that its requests get
@@ -37,37 +35,6 @@ WATCH = """() => { window.outcomes = {}; const fetched = window.fetch;
       outcomes[state] = (outcomes[state] || 0) + 1;
     }
     return answer; }; }"""
-ORDERS = "[...document.querySelectorAll('#orders li')].map((one) => one.textContent.replace(/^[0-9:]+ /, ''))"
-
-
-ENABLED = "document.querySelector('button[data-word=%s]').getAttribute('aria-disabled') === 'false'"
-
-
-class Panels:
-    """Starts panels, and ends those that run."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.running: list[subprocess.Popen[str]] = []
-
-    def start(self, *options: str) -> str:
-        """The address of a new panel."""
-        words = [sys.executable, "-m", "rths", "panel", "--no-browser", *options]
-        process = subprocess.Popen(
-            words, cwd=self.folder, stdout=subprocess.PIPE, text=True, env=environment()
-        )
-        self.running.append(process)
-        assert process.stdout is not None
-        return process.stdout.readline().split()[-1]
-
-    def end(self) -> None:
-        """End all of them."""
-        for process in self.running:
-            process.terminate()
-            assert process.wait(HANG_S) == 0
-            assert process.stdout is not None
-            process.stdout.close()
-        self.running = []
 
 
 @pytest.fixture
@@ -78,11 +45,6 @@ def panels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Panels]:
     for process in found.running:
         process.kill()
         process.communicate()
-
-
-def press(page: Page, word: str) -> None:
-    """Press a button with the mouse."""
-    page._page.click(f"button[data-word={word}]")
 
 
 def test_a_thousand_stops_reach_the_laboratories_and_none_is_lost(panels: Panels, short_plan: Plan) -> None:
