@@ -23,6 +23,7 @@ from models.compiled import bound
 from models.registry import Array
 from models.system import System
 from recorder.encoding import RowEncoder, RowTable
+from simulation.sweep.intensity import spectral_acceleration
 
 SHORT = 0.01  # s: five ticks of the default interval; a kernel is compiled by its first call
 TWO_TABLES = "[slave.a]\n[slave.b]\n"
@@ -47,11 +48,12 @@ def compile_all() -> None:
 
 
 def closed_loops(plan: Plan, ground: Array) -> None:
-    """The rollouts with kernels of their own: one table at a slave, two tables, and laboratories of other kinds."""
+    """The rollouts with kernels of their own, of one table at a slave, two tables and other kinds, and the motion's."""
     tables = with_test(parse(TWO_TABLES, Path()), duration=SHORT)
     columns = replace(plan, slave=replace(plan.slave, kind=COLUMN))
     for one in (plan, tables, columns):
         simulate(one, ground)
+    spectral_acceleration(ground[0], plan.test.interval, 0.5, 0.05)
 
 
 def ticks(plan: Plan, ground: Array) -> None:

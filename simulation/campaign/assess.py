@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from itertools import islice, product
 from typing import NamedTuple
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from common.plan.plan import Plan
 from diagnosis.findings.found import Diagnosis
@@ -24,6 +22,7 @@ from simulation.campaign.goal import CampaignTest, Goal, plan_of
 from simulation.campaign.hypotheses import HiddenCauses
 from simulation.campaign.information import Expected
 from simulation.campaign.steps import Endured, Option, PossibleCause
+from simulation.workers.threads import one_thread
 
 Found = Mapping[str, Diagnosis]  # by role of the slave
 
@@ -50,12 +49,6 @@ def nominal(goal: Goal) -> tuple[Option, ...]:
     with one_thread():
         known = HiddenState({}, hypotheses.hiding(expected.rehearsed(plan), played=False))
         return tuple(looked_at(goal, known, 1, Endured())[0])
-
-
-def one_thread() -> AbstractContextManager[object]:
-    """One BLAS thread: sums over several differ in their last bits with the number of threads."""
-    found: AbstractContextManager[object] = threadpool_limits(limits=1, user_api="blas")
-    return found
 
 
 def tests(goal: Goal, test: int) -> Iterator[tuple[CampaignTest, Plan]]:

@@ -26,7 +26,8 @@ from simulation.sweep.definition import Sweep
 from simulation.sweep.intensity import spectral_acceleration
 from simulation.sweep.luggage import Luggage
 from simulation.sweep.rows import Row
-from simulation.workers.parts import Batch
+from simulation.workers.batch import Batch
+from simulation.workers.threads import one_thread
 from simulation.workers.versions import versions
 
 SIZE = 64  # tests in a task: a quarter of a second of 40 s tests, so that sending them costs about 1 %
@@ -101,7 +102,8 @@ def batch(task: Task) -> Batch:
     stage = kept.get(task.digest) or SweepStage(task.luggage)  # another thread may have taken it out
     first = task.number * SIZE
     numbers = range(first, min(first + SIZE, stage.sweep.rows))
-    found = [test(stage, rows.row(stage.sweep, number)) for number in numbers]
+    with one_thread():
+        found = [test(stage, rows.row(stage.sweep, number)) for number in numbers]
     return Batch(task.number, {name: [one[name] for one in found] for name in found[0]})
 
 

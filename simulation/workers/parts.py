@@ -22,6 +22,7 @@ from pyarrow import feather, parquet
 from common.errors import InputError
 from common.terminal import outputs
 from common.terminal.telling import Tell, untold
+from simulation.workers.batch import Batch
 from simulation.workers.pool import spread
 
 ABOUT = "about.json"
@@ -29,15 +30,6 @@ ENDING = ".parts"  # of the folder beside a table
 PART = ".arrow"
 NEW = ".new"
 ROWS = 65536  # of a row group, so that a reader of a few columns reads a few pages
-
-Columns = Mapping[str, Sequence[Any]]
-
-
-class Batch(NamedTuple):
-    """The rows of one task, by its number."""
-
-    number: int
-    columns: Columns
 
 
 class Way(NamedTuple):

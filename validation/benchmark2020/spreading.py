@@ -12,7 +12,8 @@ import pyarrow as pa
 
 from common.plan.laboratory_tables import CompensatorTable
 from common.terminal.telling import Tell, untold
-from simulation.workers.parts import Batch, Way, complete, parts, write
+from simulation.workers.batch import Batch
+from simulation.workers.parts import Way, complete, parts, write
 from simulation.workers.versions import versions
 from validation.benchmark2020.criteria import Criteria
 from validation.benchmark2020.problem import CASES, MOTIONS, with_compensator

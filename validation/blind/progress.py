@@ -11,7 +11,8 @@ from typing import Any
 import pyarrow as pa
 
 from common.plan import read as plans
-from simulation.workers.parts import Batch, Parts
+from simulation.workers.batch import Batch
+from simulation.workers.parts import Parts
 from simulation.workers.versions import versions
 from validation.blind.cases.case import Case
 from validation.blind.judge import DiagnosisAnswer, answer

@@ -15,7 +15,8 @@ from common.terminal.telling import Tell, untold
 from simulation.campaign import assess
 from simulation.campaign.goal import Goal
 from simulation.campaign.steps import BegunStep
-from simulation.workers.parts import Batch, Way, complete, parts, write
+from simulation.workers.batch import Batch
+from simulation.workers.parts import Way, complete, parts, write
 from simulation.workers.versions import versions
 from validation.blind.cases.case import Case
 from validation.campaigns.compare import ComparedCase, PlayedCampaign, compare

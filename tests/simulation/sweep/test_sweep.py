@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +21,6 @@ from loop.of_reality import really
 from loop.signals import by_role
 from models.ground_motion.motions import FOLDER
 from simulation.sweep import definition, luggage, measures, play, rows, table
-from simulation.sweep.intensity import spectral_acceleration
 from simulation.workers.parts import Way
 from tests.helpers import ROOT
 
@@ -154,12 +155,11 @@ def test_a_loop_that_diverges_exceeds_every_limit() -> None:
     assert found["peak_drift"] == found["limit_share"] == np.inf
 
 
-def test_the_spectral_acceleration_of_a_sine_at_resonance_agrees_with_the_closed_form() -> None:
-    """The stationary response of an oscillator of ratio ζ is 1/(2ζ) times the excitation."""
-    interval, period, ratio = 0.002, 0.5, 0.05
-    t = interval * np.arange(20_000)
-    ground = np.sin(2.0 * np.pi * t / period)
-    assert spectral_acceleration(ground, interval, period, ratio) == pytest.approx(10.0, rel=2e-3)
+def test_a_worker_loads_no_package_that_only_the_table_needs() -> None:
+    """Each takes a tenth to half a second of processor time in every worker."""
+    code = "import sys, simulation.sweep.play; print(*{'pyarrow', 'scipy.signal', 'scipy.stats'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert not done.stdout.strip()
 
 
 @pytest.mark.parametrize(

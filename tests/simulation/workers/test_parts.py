@@ -11,7 +11,8 @@ import pytest
 from pyarrow import parquet
 
 from common.errors import InputError
-from simulation.workers.parts import Batch, Parts, Way, complete, parts, write
+from simulation.workers.batch import Batch
+from simulation.workers.parts import Parts, Way, complete, parts, write
 
 SCHEMA = pa.schema([pa.field("row", pa.int64()), pa.field("square", pa.float64(), metadata={"unit": "m²"})])
 ABOUT = {"seed": 1}
