@@ -22,17 +22,16 @@ from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
 from diagnosis.learned.learn import learn
 from diagnosis.recorded import link, link_effects
+from diagnosis.recorded.divided import driven, parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.joined import joined, refuse_others
-from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.link import LinkFinding
-from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryPart, LoggedBuilding, Part
+from diagnosis.recorded.parts import Building, LaboratoryPart, LoggedBuilding, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from models.system import System
 
 # s. A shorter recording is not judged: it holds less than one period of the default building's first mode (2 Hz).
 SHORTEST = 0.5
-BUILDING = ("ground_acceleration", "displacement")
 UNNAMED = ("partly", "unknown")  # outcomes of a part in which some of the gap has no named cause
 # Ratio of the noise in a balance of forces to that of the forces used, from which on a logger caused it.
 # A wrong mass gives a smaller ratio.
@@ -206,33 +205,6 @@ def reversed_signs(datas: Sequence[Data]) -> list[str]:
                     f"{name} has the opposite sign of what the plan predicts: check its sign and the command's."
                 )
     return result
-
-
-def parts_of(record: Record) -> list[Part]:
-    """The parts whose inputs and outputs were recorded."""
-    parts: list[Part] = []
-    if record.ground is not None and record.has("ground_acceleration"):
-        parts.append(Ground(record, record.ground))
-    if record.has(*BUILDING, *used(record)) and not record.plan.foreign:
-        parts.append(Building(record))
-    for lab in record.labs:
-        if driven(record, lab):
-            parts.append(LaboratoryPart(record, lab))
-        elif lab.kind.name == COLUMN and record.has(*lab.measured):
-            parts.append(ColumnAlone(record, lab))
-    return [part for part in parts if np.any(part.measured)]
-
-
-def used(record: Record) -> list[str]:
-    """The signals that the building was computed from, the ground motion aside."""
-    own, other = record.own, record.other
-    names = [own.kind.channels.force, own.kind.channels.position] if own else []
-    return names + ([other.kind.channels.used] if other else [])
-
-
-def driven(record: Record, lab: RecordedLaboratory) -> bool:
-    """Whether a command of a laboratory was recorded with a reading of it."""
-    return any(map(record.has, lab.commands)) and any(map(record.has, lab.measured))
 
 
 def not_recorded(record: Record) -> list[str]:

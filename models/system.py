@@ -64,11 +64,14 @@ class ColumnEffects:
     friction_asymmetry: float = 0.0  # share more in the positive direction, and less in the other
     friction_drop: float = 0.0  # share that is lost at speed
     friction_speed: float = 0.02  # m/s, at which two thirds of that are lost
+    friction_law: float = 0.0  # 2: a slider in the place of the planned specimen
+    friction_stiffness: float = 1e7  # N/m, of that slider's joint
     viscous: float = 0.0  # N·s/m
     inertia: float = 0.0  # kg
     slip: float = 0.0  # m, whole gap
     slip_law: float = 0.0  # where the gap is: `laboratories.column.specimen.PLAYS`
     slip_share: float = 1.0  # of the stiffness that is behind the gap; the rest is beside it
+    slip_corner: float = 0.0  # m, length over which a gap with round corners closes
     learned: tuple[float, ...] = ()  # a law of `models.preisach` that adds to the force, N
 
 

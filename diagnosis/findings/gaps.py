@@ -10,6 +10,7 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import residuals
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded import link
+from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.loop import RecordedLoop
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
@@ -34,6 +35,15 @@ class RecordingGaps:
         if record.simulable and record.has(*record.targets) and names and record.ground is not None:
             exchange = link.exchange_of(record.run, record.ticks) if found.link else None
             self.loop = RecordedLoop(record, record.ground, exchange, names)
+        own = record is found.record
+        whole = [verdict.search.data.part for verdict in found.verdicts] if own else parts_of(record)
+        self._parts = [part for part in whole if not part.exact]
+
+    @property
+    def judges(self) -> bool:
+        """Whether the recording can judge a finding: by its closed loop, or by parts that were judged elsewhere too."""
+        known = {name for verdict in self.found.verdicts for name in verdict.search.data.part.signals}
+        return self.loop is not None or any(known & set(part.signals) for part in self._parts)
 
     def signals(self, sites: frozenset[str] | None) -> Mapping[str, Array] | None:
         """Simulated response with the effects of some sites, of all where None."""
@@ -49,10 +59,8 @@ class RecordingGaps:
     def open(self, systems: Mapping[str, System]) -> Mapping[str, Array]:
         """Each part's own prediction, where no loop was recorded."""
         result: dict[str, Array] = {}
-        for verdict in self.found.verdicts:
-            part = verdict.search.data.part
-            if not part.exact:
-                result |= dict(zip(part.signals, part.predict(systems[part.role]).T, strict=True))
+        for part in self._parts:
+            result |= dict(zip(part.signals, part.predict(systems[part.role]).T, strict=True))
         return result
 
     def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:

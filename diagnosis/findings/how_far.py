@@ -89,7 +89,7 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
         waterfall(own, traces, summary),
         histories(own, before, after),
         (
-            *([] if others else ["The recordings given for validation hold no closed loop to judge by."]),
+            *([] if others else ["The recordings given for validation hold no part that was judged."]),
             *([NOT_SHOWN] if hidden else []),
         ),
     )
@@ -250,11 +250,11 @@ def closed_interval(
 
 
 def validated(found: Diagnosis, validation: Sequence[Record], own: HowFar) -> HowFar | None:
-    """The same on other recordings of the laboratories, None where none of them holds a closed loop."""
+    """The same on other recordings of the laboratories, None where none of them holds a part that was judged."""
     before, after, floor, alone = [], [], [], []
     for record in validation:
         gaps = RecordingGaps(found, record, np.ones(record.ticks, dtype=bool))
-        if gaps.loop is None:
+        if not gaps.judges:
             continue
         bare_, whole = gaps.signals(frozenset()), gaps.signals(None)
         before.append(overall(gaps.gap(bare_)))

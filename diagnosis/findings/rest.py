@@ -66,9 +66,9 @@ def judged(
 
 
 def on_others(found: Diagnosis, validation: Sequence[Record]) -> Gaps | None:
-    """Means over the recordings given, None where none of them holds a closed loop."""
+    """Means over the recordings given, None where none of them holds a part that was judged."""
     judges = [RecordingGaps(found, record, np.ones(record.ticks, dtype=bool)) for record in validation]
-    gaps = [gaps_of(judge, "law", OTHERS) for judge in judges if judge.loop is not None]
+    gaps = [gaps_of(judge, "law", OTHERS) for judge in judges if judge.judges]
     if not gaps:
         return None
     before, named, learned, floor = (

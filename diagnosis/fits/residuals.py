@@ -100,6 +100,17 @@ class Data:
             raw = self.residual(system) / self.sigma
         except InputError:  # a hypothesis that this plan's model cannot have
             return np.full((self.groups, self.sigma.size), FAR)
+        return self.whitened(raw)
+
+    @cached_property
+    def energy(self) -> float:
+        """Σ (reading/σ)² of the withheld groups, scaled to as many as there are: that of a prediction of nothing."""
+        raw = np.where(self.there, self.part.measured, 0.0) / self.sigma
+        held = self.whitened(raw)[~self.train]
+        return float(np.mean(np.square(held))) * self.groups * self.sigma.size
+
+    def whitened(self, raw: Array) -> Array:
+        """Residuals in σ (ticks, signals) averaged over groups and whitened, (groups, signals); `raw` may change."""
         if self.factors is None:
             return finite(self.averaged(raw))
         for place in np.flatnonzero(~self.there.all(axis=0)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from diagnosis.fits import candidates, fitting, hypothesis, settling, trade, worth
+from diagnosis.fits import candidates, fitting, hypothesis, laws, settling, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
@@ -44,6 +44,8 @@ def search(data: Data, scales: Scales) -> Search:
         first = candidates.best_laws(bare, scales)
     else:
         bare, first = settling.instead_of_colour(bare, scales)
+    if first:
+        first = sorted([*laws.coupled(bare, first[0]), *first], key=lambda fit: fit.cost)
     bare, chosen, first = selected(bare, first, scales)
     if not chosen.names:
         return Search(bare.data, bare, chosen, ())

@@ -92,10 +92,15 @@ def alone(fit: Fit) -> list[Fit]:
 
 
 def parted(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:
-    """Fits in which an effect has the first of its laws and another effect stands beside it, as good or worth it."""
+    """Fits in which an effect has the first of its laws and another effect stands beside it, as good or worth it.
+
+    Effects that one model holds together are left as they are: one of them under another law explains little.
+    """
     result = []
+    laws = {name: fit.data.catalogue[name].law(values) for name, values in fit.values.items()}
+    whole = {held for name, law in laws.items() if law and law.beside for held in (name, *law.beside)}
     for name, values in fit.values.items():
-        if not values.get("law"):
+        if not values.get("law") or name in whole:
             continue
         usual = fit.data.catalogue[name].under(0, values)
         plain = fitting.fit(fit.data, fit.values | {name: usual}, fit.z)

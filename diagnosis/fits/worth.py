@@ -36,7 +36,9 @@ def is_gap(fit: Fit) -> bool:
 
 def enough(bare: Fit, fit: Fit) -> bool:
     """Whether the residual is too small for a further effect to be worth it."""
-    return not is_gap(fit) or (excess(fit) < TRACE * excess(bare) and fit.prior <= SUSPICIOUS)
+    return not is_gap(fit) or (
+        excess(fit) < TRACE * min(excess(bare), bare.data.energy) and fit.prior <= SUSPICIOUS
+    )
 
 
 def is_worth(bare: Fit, before: Fit, after: Fit) -> bool:
@@ -75,8 +77,13 @@ def cancelling(bare: Fit, sizes: list[Array]) -> bool:
 
 
 def refines(bare: Fit, before: Fit, after: Fit) -> bool:
-    """Whether a further effect takes away enough of what is left, and of the whole gap."""
-    left, saved, whole = excess(before), excess(before) - excess(after), excess(bare)
+    """Whether a further effect takes away enough of what is left, and of the whole gap.
+
+    A gap that is larger than the readings themselves counts as these: a nominal stiffness that means nothing must not
+    hide what a specimen does.
+    """
+    left, saved = excess(before), excess(before) - excess(after)
+    whole = min(excess(bare), bare.data.energy)
     if remaining(before) > LOUD:  # far from any noise a model may well be refined in small steps
         return saved > STEP_OF_REST * left and saved > STEP_OF_WHOLE * whole
     return (saved > REST * left and saved > TRACE * whole) or (saved > HALF * left and saved > SHARE * whole)

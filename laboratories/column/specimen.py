@@ -2,9 +2,9 @@
 
     f = g(δ_max)·p(δ')·(f_column(δ') + e(δ')) + friction + c·δ̇ + m·δ̈,    δ' = δ outside the grip's gap
 
-`f_column` is the plan's model or, with the effects of yielding or centring, another of `models.specimens` in its place;
-e is the effect of hardening; m and c include the plan's mass and dashpot. A law learned from a recording adds to the
-force. Without any of these the force equals exactly that of the plan's model.
+`f_column` is the plan's model or, with the effects of yielding, centring or a slider, another of `models.specimens` in
+its place; e is the effect of hardening; m and c include the plan's mass and dashpot. A law learned from a recording
+adds to the force. Without any of these the force equals exactly that of the plan's model.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from common.plan.laboratory_tables import Column
 from models import friction, preisach, specimens
 from models.compiled import jit, jit_apart
 from models.registry import Array
-from models.specimens import SPECIMENS, self_centring
+from models.specimens import SPECIMENS, self_centring, slider
 from models.system import ColumnEffects
 
 # places in `effects`
 PRESENT, STIFFNESS, YIELDS, DEGRADATION, PINCHING, PINCHING_WIDTH, PINCHING_HARDENING = range(7)
 FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP, FRICTION_VELOCITY = range(7, 13)
 ASYMMETRY, DROP, SPEED, PLAY, BESIDE, CENTRES, STIFFENING, BEND = range(13, 21)
-SECOND_STIFFENING, SECOND_BEND, PINCHING_TAILS = range(21, 24)
+SECOND_STIFFENING, SECOND_BEND, PINCHING_TAILS, SLIDES, CORNER = range(21, 26)
 
 # places in `cell`; the last two are the specimen's place within play, and the force that it carried there
 DEFORMATION, RATE, LARGEST, SLIDER, LAST_STEP, REACTION, INSIDE, CARRIED = range(8)
@@ -42,7 +42,8 @@ LAWS = (
     "pinched_by_rest",
     "pinched_by_rest",
 )  # of yielding, in the order of `ColumnEffects.law`
-PLAYS = ORIGIN, RESTING, HELD, PARTLY = range(4)  # where the gap is: see `column.slip`
+PLAYS = ORIGIN, RESTING, HELD, PARTLY, ROUNDED = range(5)  # where the gap is: see `column.slip`
+IN_PLACE = 2  # of `ColumnEffects.friction_law`: a slider in the place of the planned specimen
 TWICE = 2  # of `ColumnEffects.stiffening_law`: with two bends
 STIFFENED_AT = 2e-3  # m, reference deformation of hardening with the square of the deformation
 DEGRADED_AT = (
@@ -61,6 +62,8 @@ class Specimen(NamedTuple):
     yielded: Array  # memory of that law
     centring: Array  # parameters of the law of centring, likewise
     centred: Array  # memory of that law
+    sliding: Array  # parameters of a slider, likewise
+    slid: Array  # memory of that slider
     cell: Array  # memory of the effects
     learned: Array  # a law of `models.preisach`, empty for none
     learned_memory: Array
@@ -73,6 +76,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
     code, params, memory = specimens.pack(column.model, stiffness=column.stiffness, **column.parameters)
     yields, centres = np.isfinite(more.yield_displacement), np.isfinite(more.centring)
     bend = more.stiffening_bend if more.stiffening_law else 0.0
+    slides = bool(more.friction_law == IN_PLACE and more.friction)
     values = [
         float(more != ColumnEffects()),
         column.stiffness,
@@ -81,11 +85,11 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         more.pinching,
         more.pinching_width,
         more.pinching_hardening,
-        more.friction,
+        0.0 if slides else more.friction,
         more.presliding,
         more.viscous,
         more.inertia,
-        more.slip,
+        0.0 if slides else more.slip,  # the slider's joint has it
         more.friction_velocity,
         more.friction_asymmetry,
         more.friction_drop,
@@ -98,6 +102,8 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         more.stiffening_second * column.stiffness if more.stiffening_law == TWICE else 0.0,
         more.stiffening_second_bend,
         more.pinching_tails if more.pinching_law else 0.0,
+        float(slides),
+        corner(more),
     ]
     law = np.array(more.learned)
     return Specimen(
@@ -109,6 +115,8 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         np.zeros(specimens.STATE_SIZE),
         np.array([column.stiffness, bending(more.centring), more.centring_hardening, more.centring_loop]),
         np.zeros(self_centring.STATE_SIZE),
+        sliding(more),
+        np.zeros(slider.STATE_SIZE),
         np.zeros(8),
         law,
         preisach.memory(law),
@@ -118,6 +126,18 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
 def bending(place: float) -> float:
     """Where a law bends (m), at any place where it does not."""
     return place if np.isfinite(place) else 1.0
+
+
+def corner(effects: ColumnEffects) -> float:
+    """Length (m) over which a gap closes, 0 where its law has sharp corners."""
+    return effects.slip_corner if effects.slip_law == ROUNDED else 0.0
+
+
+def sliding(effects: ColumnEffects) -> Array:
+    """Parameters of a slider in the specimen's place, in its kernel's order; its joint has the play of the grip."""
+    push, pull = (effects.friction * (1.0 + side * effects.friction_asymmetry) for side in (1.0, -1.0))
+    joint = [effects.slip, corner(effects)]
+    return np.array([effects.friction_stiffness, push, pull, *joint])
 
 
 def yielding(stiffness: float, effects: ColumnEffects) -> Array:
@@ -155,7 +175,7 @@ def with_rates(column: Column, force: Array, displacement: Array, interval: floa
 def needs_substeps(effects: ColumnEffects | None) -> bool:
     """Whether an effect depends on the rate of deformation, so that an interval must be divided into short steps."""
     more = effects or ColumnEffects()
-    return bool(more.viscous or more.inertia or more.friction)
+    return bool(more.viscous or more.inertia or (more.friction and more.friction_law != IN_PLACE))
 
 
 @jit
@@ -175,10 +195,13 @@ def force(specimen: Specimen, deformation: float, step: float) -> float:
 def behind_play(effects: Array, cell: Array, deformation: float) -> float:
     """Deformation (m) of a specimen in a grip with play.
 
-    The gap is about the origin; or where the specimen rests without force, once it leaves the contact that loads it; or
-    where it is held, by friction, until the other flank takes it along.
+    The gap is about the origin, with sharp or with round corners; or where the specimen rests without force, once it
+    leaves the contact that loads it; or where it is held, by friction, until the other flank takes it along.
     """
     half = 0.5 * effects[SLIP]
+    if half > 0.0 and effects[CORNER] > 0.0:
+        s = effects[CORNER]
+        return s * (slider.softplus((deformation - half) / s) - slider.softplus((-deformation - half) / s))
     if half == 0.0 or effects[PLAY] == ORIGIN or effects[PLAY] == PARTLY:
         return deformation - min(max(deformation, -half), half)
     if effects[PLAY] == RESTING and cell[CARRIED] != 0.0:
@@ -189,11 +212,18 @@ def behind_play(effects: Array, cell: Array, deformation: float) -> float:
 
 
 @jit
-def carried(specimen: Specimen, within: float) -> float:
-    """Force (N) of the column at its own deformation (m): of the plan's model, or of the laws in its place."""
+def carried(specimen: Specimen, within: float, rate: float) -> float:
+    """Force (N) of the column at its own deformation (m): of the plan's model, or of the laws in its place.
+
+    `rate` (m/s) of the deformation is what the friction of a slider depends on.
+    """
     effects = specimen.effects
-    result = specimens.step(specimen.code, specimen.params, specimen.memory, within)
-    elastic = effects[STIFFNESS] * within
+    if effects[SLIDES] != 0.0:
+        level = friction.left(rate, 0.0, effects[DROP], effects[SPEED])
+        result, elastic = slider.moved(specimen.sliding, specimen.slid, within, level), 0.0
+    else:
+        result = specimens.step(specimen.code, specimen.params, specimen.memory, within)
+        elastic = effects[STIFFNESS] * within
     if effects[YIELDS] != 0.0:
         law = int(effects[YIELDS])
         result += specimens.step(law, specimen.yielding, specimen.yielded, within) - elastic
@@ -222,7 +252,9 @@ def with_effects(specimen: Specimen, deformation: float, step: float) -> float:
     effects, cell = specimen.effects, specimen.cell
     rested, loaded = cell[INSIDE], cell[CARRIED]
     within = behind_play(effects, cell, deformation)
-    result = carried(specimen, within)
+    moved = deformation - cell[DEFORMATION]
+    rate = moved / step
+    result = carried(specimen, within, rate)
     if effects[PLAY] == RESTING and effects[SLIP] > 0.0:
         if result * loaded < 0.0 or (loaded == 0.0 and within == rested):  # between both contacts
             result = 0.0
@@ -235,8 +267,6 @@ def with_effects(specimen: Specimen, deformation: float, step: float) -> float:
     if effects[PINCHING] != 0.0:
         closed = bell((within / effects[PINCHING_WIDTH]) ** 2, effects[PINCHING_TAILS])
         result *= 1.0 - effects[PINCHING] * closed + effects[PINCHING_HARDENING] * (1.0 - closed)
-    moved = deformation - cell[DEFORMATION]
-    rate = moved / step
     if effects[FRICTION] != 0.0:
         contact = effects[PRESLIDING]
         cell[SLIDER] = min(max(cell[SLIDER] + moved, -contact), contact)

@@ -56,6 +56,9 @@ class Law:
     fixed: Mapping[str, float] = field(
         default_factory=dict
     )  # its parameters of shape that a fit leaves as they are
+    beside: Mapping[str, Mapping[str, str]] = field(
+        default_factory=dict
+    )  # other effects that the model holds too, with the model's names of their parameters
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from models.specimens import (
     menegotto_pinto,
     pinched,
     self_centring,
+    slider,
     trilinear,
 )
 
@@ -82,6 +83,7 @@ SPECIMENS = {
         ),
         SpecimenModel("pinched_by_peak", 9, pinched.PinchedParams, pinched.RULES, pinched.STATE_SIZE),
         SpecimenModel("pinched_by_rest", 10, pinched.PinchedParams, pinched.RULES, pinched.STATE_SIZE),
+        SpecimenModel("slider", 11, slider.SliderParams, slider.RULES, slider.STATE_SIZE),
     )
 }
 CORNERS = 8  # by which the code of a further pinched model exceeds its corner of reloading in `pinched`
@@ -129,6 +131,8 @@ def step(kind: int, p: Array, s: Array, deformation: float) -> float:
         force = trilinear.step(p, s, deformation)
     elif kind == 8:
         force = self_centring.step(p, s, deformation)
+    elif kind == 11:
+        force = slider.step(p, s, deformation)
     else:
         force = linear.step(p, s, deformation)
     return force

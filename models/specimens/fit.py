@@ -133,6 +133,13 @@ FREE: dict[str, dict[str, SearchRange]] = {
         "hardening": HARDENING,
         "loop": SearchRange(0.0, 1.0, (0.3, 0.8), log=False),
     },
+    "slider": {
+        "stiffness": SearchRange(1.0, 1000.0, (3.0, 15.0), "secant"),
+        "push": SearchRange(0.02, 3.0, (0.8,), "strength"),
+        "pull": SearchRange(0.02, 3.0, (0.8,), "strength"),
+        "play": SearchRange(1e-4, 1.9, (0.01, 0.1, 0.5), "reach"),
+        "corner": SearchRange(1e-4, 0.2, (0.01,), "reach"),
+    },
 }
 
 
@@ -218,9 +225,9 @@ def record(model: str, deformation: Array, force: Array) -> tuple[Array, Array]:
 
 
 def scales(path: Array, force: Array) -> dict[str, float]:
-    """The units of the ranges: the largest deformation (m), the secant stiffness (N/m), and one."""
-    reach = float(np.abs(path).max())
-    return {"reach": reach, "secant": float(np.abs(force).max()) / reach, "": 1.0}
+    """The units of the ranges: the largest deformation (m) and force (N), the secant stiffness (N/m), and one."""
+    reach, strength = float(np.abs(path).max()), float(np.abs(force).max())
+    return {"reach": reach, "strength": strength, "secant": strength / reach, "": 1.0}
 
 
 def thinned(path: Array, most: int) -> NDArray[np.intp]:

@@ -16,13 +16,13 @@ from common.plan.plan import Plan
 from common.recording.run import Run
 from common.roles import MASTER
 from common.signals import shared
-from diagnosis.diagnose import parts_of
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded import record
+from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import LaboratoryPart, Part, with_fields
 from laboratories.kinds import topics as topics_of

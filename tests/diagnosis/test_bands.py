@@ -14,7 +14,6 @@ from common.plan.plan import Plan
 from common.reality import reality
 from common.reality.reality import Reality
 from common.recording.reader import read
-from diagnosis.diagnose import parts_of
 from diagnosis.findings import readings
 from diagnosis.findings.for_prediction.as_reality import as_reality
 from diagnosis.findings.found import Diagnosis
@@ -22,6 +21,7 @@ from diagnosis.findings.verdict import heard, judge
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.search import Search
 from diagnosis.recorded import record
+from diagnosis.recorded.divided import parts_of
 from loop import substructure
 from loop.closed_loop import Rollout
 from loop.of_reality import really

@@ -104,9 +104,20 @@ def test_without_a_loop_the_parts_are_judged_by_themselves(cases: Cases) -> None
     assert closed["closed"] > 0.9
     assert closed["after"] == pytest.approx(closed["noise_floor"], rel=0.15)
     assert not far.warnings
-    warned = how_far.judge(found, [without_table_target(cases)])
+    judged = how_far.judge(found, [without_table_target(cases)])
+    assert judged.how_far.judged_on == "other recordings"
+    assert judged.how_far.plain()["closed"] > 0.9
+
+
+def test_a_recording_of_other_parts_judges_nothing_and_says_so(cases: Cases) -> None:
+    found = examine(without_table_target(cases))
+    run = read(cases.file(FOUND["damper"]))
+    for name in ("table_target", "table_command", "damper_command", "actuator_command", "column_force"):
+        for topic in ("master", "slave"):
+            run.columns[topic].pop(name, None)
+    warned = how_far.judge(found, [record.build(run)])
     assert warned.how_far.judged_on == "interleaved (interpolation)"
-    assert any("no closed loop" in text for text in warned.warnings)
+    assert any("no part" in text for text in warned.warnings)
 
 
 @pytest.mark.parametrize(

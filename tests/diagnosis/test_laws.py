@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
+import pytest
 
 from common.plan.plan import Plan
 from common.roles import MASTER
@@ -288,3 +289,38 @@ def test_play_behind_the_tables_loop_is_told_from_play_before_it() -> None:
     assert CATALOGUE["table.backlash"].laws[int(values["law"])].name == "behind the loop"
     np.testing.assert_allclose(values["width"], part.WIDTH, rtol=0.05)
     assert fitting.excess(found) < 0.2 * fitting.excess(before)
+
+
+class FrictionDamper(ColumnAlone):
+    """A column alone that is a friction damper behind a joint with play, written step by step."""
+
+    PUSH, PULL, JOINT, PLAY = 6e3, 9e3, 20e6, 1e-3
+
+    def __init__(self) -> None:
+        self.signals, self.nuisances, self.role = ("column_force",), (), MASTER
+        self.candidates = tuple(
+            CATALOGUE[f"column.{name}"] for name in ("yielding", "slip", "friction", "viscous", "stiffness")
+        )
+        self.inputs = swelling()
+        place, force = 0.0, np.empty(TICKS)
+        for tick, x in enumerate(self.inputs):
+            place = min(place, x + 0.5 * self.PLAY + self.PULL / self.JOINT)
+            place = max(place, x - 0.5 * self.PLAY - self.PUSH / self.JOINT)
+            stretch = x - place
+            force[tick] = self.JOINT * (stretch - min(max(stretch, -0.5 * self.PLAY), 0.5 * self.PLAY))
+        self.measured = (force + NOISE * np.random.default_rng(3).standard_normal(TICKS))[:, None]
+        self.present = np.ones((TICKS, 1), dtype=bool)
+
+
+def test_a_friction_damper_with_play_is_friction_and_slip_whatever_stiffness_is_planned() -> None:
+    group, train = residuals.withheld(TICKS, INTERVAL)
+    level = np.array([NOISE])
+    part = FrictionDamper()
+    data = Data(part, System(Plan()), level, level, group, train, np.zeros(1))
+    bare = fitting.fit(data, {})
+    (found,) = laws.coupled(bare, bare)
+    friction, slip = found.values["column.friction"], found.values["column.slip"]
+    assert friction["force"] == pytest.approx(0.5 * (part.PUSH + part.PULL), rel=0.02)
+    assert friction["asymmetry"] == pytest.approx(-0.2, abs=0.01)
+    assert slip["gap"] == pytest.approx(part.PLAY, rel=0.05)
+    assert found.chi < 1.2 * found.reduced.size

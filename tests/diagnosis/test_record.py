@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from common.errors import InputError
 from common.recording.reader import read
 from common.recording.run import GROUND, Run
-from diagnosis.diagnose import not_recorded, parts_of
+from diagnosis.diagnose import not_recorded
 from diagnosis.recorded import record
+from diagnosis.recorded.divided import parts_of
 from tests.diagnosis.cases import Cases, short
 
 

@@ -100,3 +100,12 @@ def test_a_friction_damper_fitted_to_three_sines_predicts_the_others(
     assert len(missed) == 10
     assert max(value for (frequency, _), value in missed.items() if frequency <= 1.0) < 20.0
     assert 30.0 < missed[2.0, 19.0] < 45.0  # it chatters, which no law from displacement to force can hold
+
+
+@pytest.mark.slow  # 20 s: three sines of a damper of which the plan says nothing right
+def test_a_friction_damper_planned_as_an_elastic_column_is_friction_behind_play(tmp_path: Path) -> None:
+    path = imported(EXAMPLES / "friction_damper.npz", "friction_damper_column", tmp_path)
+    report = diagnose_file(path).plain()
+    assert set(report["which"][0]["effects"]) == {"column.friction", "column.slip"}
+    assert report["which"][0]["parameters"]["column.friction"]["asymmetry"]["value"] < -0.1
+    assert report["how_far"]["after"] < 0.15

@@ -309,6 +309,30 @@ def test_column_friction_depends_on_direction_and_speed() -> None:
         assert rubbing == pytest.approx(900.0 * (1.0 - 0.3 * (1.0 - math.exp(-speed / 0.02))), rel=1e-6)
 
 
+def test_a_slider_takes_the_specimens_place_with_the_play_of_the_grip() -> None:
+    more = ColumnEffects(
+        friction=900.0, friction_law=2.0, friction_asymmetry=-0.2, friction_stiffness=2e6, slip=1e-3
+    )
+    path = through(8e-3, -8e-3, 4e-3)
+    given = {"stiffness": 2e6, "push": 720.0, "pull": 1080.0, "play": 1e-3}
+    assert np.allclose(
+        specimen_under(path, more), forces("slider", given, path.astype(np.float64)), rtol=1e-12
+    )
+    fast = ColumnEffects(friction=900.0, friction_law=2.0, friction_drop=0.3, friction_speed=0.02)
+    way = np.arange(1, 400) * 0.02 * SHORT
+    left = 900.0 * (1.0 - 0.3 * (1.0 - math.exp(-1.0)))
+    assert specimen_under(way, fast)[-1] == pytest.approx(left, rel=1e-6)
+
+
+@given(gap=st.floats(2e-5, 1e-3), where=st.floats(-3e-3, 3e-3))
+def test_a_gap_with_round_corners_ends_like_a_sharp_one(gap: float, where: float) -> None:
+    sharp, rounded = (
+        specimen_under(np.array([where]), ColumnEffects(slip=gap, slip_law=law, slip_corner=1e-5))[0]
+        for law in (0.0, 4.0)
+    )
+    assert abs(rounded - sharp) <= K * 1e-5 * math.log(2.0) + 1e-6
+
+
 def test_effects_of_the_column_are_added_to_any_specimen_model() -> None:
     bilinear = Column(
         model="bilinear", stiffness=K, parameters={"yield_displacement": 1e-3, "hardening": 0.1}

@@ -46,6 +46,7 @@ EXAMPLES: dict[str, dict[str, float]] = {
     "pinched_by_rest": PINCHED,
     "trilinear": {"stiffness": K, "yield_displacement": DY, "hardening": 0.05},
     "self_centring": {"stiffness": K, "yield_displacement": DY, "hardening": 0.1, "loop": 0.6},
+    "slider": {"stiffness": K, "push": K * DY, "pull": K * DY},
 }
 
 CORNERS = {
@@ -199,6 +200,33 @@ class TestBilinear:
         path = np.random.default_rng(2).uniform(-DY, DY, 100)
         path = 0.999 * path / np.abs(path).max() * DY
         np.testing.assert_allclose(forces("bilinear", path), K * path, rtol=1e-11, atol=1e-6)
+
+
+class TestSlider:
+    def test_a_cycle_is_a_parallelogram_with_play_between_the_flanks(self) -> None:
+        # hand calculation with k = 1, w = 1: it slides at 2 or at −1, and carries nothing within the play
+        path = np.array([0.5, 1.5, 2.5, 4.0, 2.5, 1.0, 0.5, 0.0, -3.0])
+        force = forces("slider", path, stiffness=1.0, push=2.0, pull=1.0, play=1.0)
+        np.testing.assert_allclose(force, [0.0, 1.0, 2.0, 2.0, 0.5, 0.0, -0.5, -1.0, -1.0], atol=1e-14)
+
+    @pytest.mark.parametrize("corner", [0.02 * DY, 0.2 * DY])
+    @pytest.mark.parametrize("play", [0.0, 0.1 * DY, DY])
+    def test_with_round_corners_it_slides_at_the_friction_for_any_increment(
+        self, corner: float, play: float
+    ) -> None:
+        shape = {"push": 0.7 * K * DY, "pull": 0.9 * K * DY, "play": play, "corner": corner}
+        coarse, fine = cycles(4 * DY, 2, 1), cycles(4 * DY, 2, 200)
+        force = forces("slider", fine, **shape)
+        np.testing.assert_allclose(force.max(), 0.7 * K * DY, rtol=1e-9)
+        np.testing.assert_allclose(force.min(), -0.9 * K * DY, rtol=1e-9)
+        np.testing.assert_allclose(forces("slider", coarse, **shape), force[::200], atol=1e-6 * K * DY)
+
+    def test_the_play_takes_its_width_from_every_half_cycle(self) -> None:
+        path = cycles(4 * DY, 3, 2000)
+        tight, loose = (forces("slider", path, play=play) for play in (0.0, DY))
+        one = 4 * 2000 + 1
+        lost = work(tight[-one:], path[-one:]) - work(loose[-one:], path[-one:])
+        assert lost == pytest.approx(2.0 * K * DY * DY, rel=1e-3)
 
 
 class TestBoucWen:
