@@ -12,7 +12,9 @@ from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.gaps import RecordingGaps, held_out
 from diagnosis.findings.series import numbers, strongest
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.findings.where import SiteTrace
+from diagnosis.fits import hypothesis
 from diagnosis.recorded import loop
 from diagnosis.recorded.loop import closed_share, overall
 from diagnosis.recorded.record import Record
@@ -26,6 +28,9 @@ from models.registry import Array
 PLAYERS = 6
 # Machines to which a search ascribes the residual of a sensor that misses samples.
 LIKE_MISSED = ("damper", "column", "table", "device")
+# Times what a sensor's repeated samples can make up to which a residual may be theirs: several samples in a row err by
+# as many intervals' motion.
+MISSED = 10.0
 INTERLEAVED, OTHERS = "interleaved (interpolation)", "other recordings"  # data on which the gap was judged
 # Share of the gap that an explanation must close: what closes less leaves the larger part of the gap open.
 SHRUNK = 0.5
@@ -293,10 +298,8 @@ def all_traces(found: Diagnosis) -> list[SiteTrace]:
         ]
     for name, share in found.held.items():
         lab = next(lab for lab in found.record.labs if name in lab.measured)
-        if not any(
-            name in item.search.data.part.signals and item.outcome in LEAVING for item in found.verdicts
-        ):
-            continue  # where nothing is left, repeated samples explain nothing
+        if not any(may_be_missed(item, name, share) for item in found.verdicts):
+            continue
         site = lab.site(f"sensor.{name.removeprefix(lab.ahead)}")
         gone = {site, *(one.site(place) for one in found.record.labs for place in LIKE_MISSED)}
         result = [
@@ -306,6 +309,22 @@ def all_traces(found: Diagnosis) -> list[SiteTrace]:
     if found.link:
         result.append(SiteTrace("link", np.zeros(0), max(item.z for item in found.link), "", 1.0))
     return result
+
+
+def may_be_missed(verdict: PartVerdict, name: str, share: float) -> bool:
+    """Whether what is left of a reading may come from the share of its samples that repeat the one before.
+
+    A repeated sample errs by the motion of an interval, and so makes no gap that is much larger.
+    """
+    search = verdict.search
+    data, fit = search.data, search.commissioned
+    if verdict.outcome not in LEAVING or name not in data.part.signals:
+        return False
+    place = data.part.signals.index(name)
+    left = data.residual(hypothesis.lay(data, fit.z, fit.values))[:, place]
+    moved = np.diff(data.part.measured[:, place])
+    caused = share * float(np.mean(moved**2))
+    return bool(np.mean(left**2) < MISSED**2 * caused)
 
 
 def shares(
