@@ -20,7 +20,7 @@ from loop import foreign, substructure
 from loop.nominal import limited
 from loop.nominal.partition import felt, matrices, taken_over
 from loop.nominal.preflight import Findings, expected_delay, findings
-from loop.rigs import probed
+from loop.rigs import probed, tried
 from models.ground_motion import GroundMotion
 from models.structures import shear_building
 from recorder import space
@@ -31,6 +31,7 @@ def facts(plan: Plan, file: Path) -> dict[str, Any]:
     """What a plan describes; raises InputError where it cannot be used."""
     motion = substructure.motion(plan)
     built = foreign.checked(plan)  # first, because it fails at once where the model does
+    tried(plan)
     found = findings(plan)
     rigs_there = [rig(one, plan) for one in probed(plan)]
     refusing = [one["risk"] for one in rigs_there if one["risk"]]

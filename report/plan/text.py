@@ -137,7 +137,7 @@ def code(classes: Sequence[Mapping[str, str]], *, emulated: bool = True) -> Iter
     """The classes that a plan names, each in a sentence; `emulated` where it has no rig of the user's."""
     for one in classes:
         place = one["file"] or "a file that is not there"
-        what = "model" if one["where"] == "structure" else "class"
+        what = "model" if one["where"] == "structure" or ":" not in one["name"] else "class"
         yield (
             f"[{one['where']}] runs the {what} '{one['name']}' from {place}, with your rights: only run plans that "
             "you trust."

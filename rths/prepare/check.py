@@ -1,7 +1,8 @@
 """`rths check`: a description of a plan, without running it.
 
-It imports no class of a rig. A plan with a user's own kind of laboratory cannot be described without that kind's class,
-which is imported unless only the list of classes is asked for.
+It imports no class of a user's rig. A rig of this program's own, in OpenSees or in an FMU, is constructed and let go,
+so that one which cannot be is refused here. A plan with a user's own kind of laboratory cannot be described without
+that kind's class, which is imported unless only the list of classes is asked for.
 """
 
 from __future__ import annotations

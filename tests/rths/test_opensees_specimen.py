@@ -187,6 +187,24 @@ def test_a_file_that_makes_no_specimen_is_refused_with_the_reason(
 
 
 @with_opensees
+@pytest.mark.parametrize(("text", "code"), [(ROD, 0), (ROD.replace("return 2, 1", "return 3, 1"), 2)])
+def test_check_builds_the_specimen_and_lists_its_file(
+    text: str, code: int, tmp_path: Path, call: Any, capsys: Any
+) -> None:
+    (tmp_path / "rod.py").write_text(text)
+    plan = tmp_path / "p.toml"
+    plan.write_text(
+        '[test]\nduration = 0.5\n[master.rig]\nclass = "rths.opensees:Specimen"\noptions = { file = "rod.py" }\n'
+    )
+    assert call("check", plan, "--classes") == 0
+    out = capsys.readouterr().out
+    assert f"the class 'rths.opensees:Specimen' from {ROOT / 'rths' / 'opensees.py'}" in out
+    assert f"the model 'rod.py' from {tmp_path / 'rod.py'}" in out
+    assert call("check", plan) == code
+    assert ("build returns node 3, which is not in the model" in capsys.readouterr().err) == (code == 2)
+
+
+@with_opensees
 def test_a_material_without_a_force_is_reported() -> None:
     rig = Specimen(0.002, 1, materials=[["Elastic", 1, float("nan")]])
     with pytest.raises(RigError) as told:
