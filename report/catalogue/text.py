@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from report.catalogue import store
 from report.catalogue.columns import BY_NAME, COLUMNS, Facts
+from report.catalogue.entry import WHOLE
 from report.text.formats import quantity
 from report.text.terminal import TitledTable
 
@@ -15,8 +16,10 @@ EMPTY = "–"
 
 
 def cell(facts: Facts, name: str) -> str:
-    """A fact as text."""
+    """A fact as text; the outcome of a recording that cannot be read is what its file is."""
     value, unit = facts[name], BY_NAME[name].unit
+    if name == "outcome" and value is None and facts["state"] != WHOLE:
+        return str(facts["state"])
     if value is None:
         return EMPTY
     if unit is None:

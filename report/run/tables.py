@@ -10,7 +10,8 @@ from typing import Any
 
 from common.plan.calibration import Calibration, calibrations, day
 from common.recording.outcome import outcome
-from common.recording.run import CLOCK, GROUND, MACHINES, Run
+from common.recording.run import CLOCK, GROUND, MACHINES, PEAKS, Run
+from common.recording.writer import SIGNALS
 from common.roles import MASTER, name_of
 from report.facts.laboratories import plan_of
 from report.page import breakable
@@ -19,8 +20,9 @@ from report.text.formats import MISSING, milliseconds, reading, storey_rows, tra
 from report.text.terminal import TitledTable
 
 EVENTS = 400  # rows on the page, which stays below a megabyte; JSON of rths inspect has all
-SHOWN = ("plan", CLOCK, GROUND, MACHINES)  # metadata that have a section of their own
-SAID = (
+# Metadata that have a section of their own, or of which the page's tables are made.
+SHOWN = ("plan", CLOCK, GROUND, MACHINES, PEAKS, SIGNALS)
+FILED = (
     "laboratory",
     "operator",
     "specimen",
@@ -46,7 +48,7 @@ def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:
         ("slaves", ", ".join(summary["slaves"])),
         ("part tested", run.metadata.get("bench", {}).get("part", "")),
         ("outcome", outcome(ended)),
-        *(((name, getattr(plan.report, name)) for name in SAID) if plan else ()),
+        *(((name, getattr(plan.report, name)) for name in FILED) if plan else ()),
     ]
     return [(name, text) for name, text in found if text]
 
