@@ -122,7 +122,14 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         exchanged(record),
         {} if late is not None else held,  # a logger's steps repeat samples too
         readings.levels(final, list(map(heard, searches))),
-        [*together(more), *of_plan(record), *not_recorded(record), *reversed_signs(datas), *repeating(held)],
+        [
+            *together(more),
+            *of_plan(record),
+            *not_recorded(record),
+            *reversed_signs(datas),
+            *repeating(held),
+            *doubted(verdicts),
+        ],
         [law for verdict in verdicts if verdict.outcome in UNNAMED for law in learn(verdict.search.chosen)],
     )
 
@@ -160,6 +167,11 @@ def exchanged(record: Record) -> list[LinkFinding]:
     return link_effects.findings(account, record.plan.test.interval)
 
 
+def said_of(record: Record, more: Sequence[Record]) -> list[str]:
+    """Sentences on what a recording can show, alone or together with `more`."""
+    return [*together(more), *of_plan(record), *not_recorded(record)]
+
+
 def together(more: Sequence[Record]) -> list[str]:
     """A sentence where several recordings were searched at once."""
     names = ", ".join(str(other.run.path) for other in more)
@@ -180,6 +192,16 @@ def of_plan(record: Record) -> list[str]:
             "were not measured at the rate of the test."
         )
     return found
+
+
+def doubted(verdicts: Sequence[PartVerdict]) -> list[str]:
+    """A sentence for each gap that might also be slow noise of a single sensor."""
+    return [
+        f"What {verdict.doubted} shows and no effect explains might also be slow noise of its sensor, although no "
+        "other sensor of its laboratory has such noise. Readings at rest would tell."
+        for verdict in verdicts
+        if verdict.doubted
+    ]
 
 
 def repeating(held: Mapping[str, float]) -> list[str]:

@@ -39,7 +39,8 @@ def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Na
     effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
     likely = float(np.prod([verdict.probability for verdict in found.verdicts]))
     if effects and any(verdict.outcome in ("partly", "unknown") for verdict in found.verdicts):
-        likely = min(likely, trust.PARTLY.probability(signs))
+        shares = [trust.share_named(item.search.explained) for item in named if item.outcome == "partly"]
+        likely = min(likely, trust.PARTLY.probability(signs), *shares)
     probability = min(sure, likely)
     if not effects:
         probability = min(probability, nothing(found))

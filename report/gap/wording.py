@@ -40,6 +40,7 @@ LEARNED_ON = {
 }
 # Share of the gap from which a site is named in the verdict: it causes more than all others together.
 DOMINANT = 0.5
+LIKELY = 0.5  # probability from which the effects named are more likely the cause than not
 NOTABLE = 1.0  # standard deviations of its tolerance that make a parameter's move worth a word
 
 
@@ -192,20 +193,24 @@ def by_part(report: Report) -> str:
     """A sentence on each part with a gap; none for a report without parts."""
     left = [entry for entry in report.parts if entry.outcome in ("explained", "partly", "unknown")]
     named = {name for entry in left for name in entry.effects}
-    texts = [f"in {entry.part} {of_part(entry)}" for entry in left]
+    likely = any((item.probability or 0.0) >= LIKELY for item in report.which[:1])
+    texts = [f"in {entry.part} {of_part(entry, likely)}" for entry in left]
     further = [name for item in report.which[:1] for name in item.effects if name not in named]
     texts += [f"in addition {effects(further)}"] if further and texts else []
     return "; ".join(texts)
 
 
-def of_part(entry: PartOfGap) -> str:
-    """The sentence on one part."""
+def of_part(entry: PartOfGap, likely: bool) -> str:
+    """The sentence on one part; effects that are not `likely` to be the cause stand in for it."""
     if entry.outcome == "unknown":
         return "its cause is not in the catalogue"
     if entry.outcome == "explained":
         return f"{effects(entry.effects)} explains it"
+    names, rest = effects(entry.effects), f"leaves {percent(entry.left)} of {percent(entry.gap)}"
     return (
-        f"{effects(entry.effects)} explains a part and leaves {percent(entry.left)} of {percent(entry.gap)}"
+        f"{names} explains a part and {rest}"
+        if likely
+        else f"{names} may stand in for another cause and {rest}"
     )
 
 

@@ -1,0 +1,108 @@
+"""Verdicts on effects that stand in for another cause, and on machines whose unknown effect looks like noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from diagnosis.diagnose import doubted
+from diagnosis.findings.trust import share_named
+from diagnosis.findings.verdict import PartVerdict, allowed, farthest, judge
+from diagnosis.fits import fitting, residuals, settling
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.search import Search
+from diagnosis.recorded.record import Record
+from diagnosis.report.records import PartOfGap
+from models.registry import Array
+from report.gap import wording
+from tests.diagnosis.cases import Cases, lab_b, white
+from tests.diagnosis.test_equivalents import DATA, NOISY
+
+GAP = np.sin(0.2 * np.arange(DATA.groups))[:, None]
+RESONANCE, WANDER = 0.3, 3e-5  # Hz, of the default damper; m, fifteen times the noise of its stroke's sensor
+
+
+def fit(residual: Array) -> Fit:
+    """A fit with an effect."""
+    return Fit(DATA, {"sensor.column_force.bias": {"offset": 3.0}}, np.zeros(0), residual)
+
+
+def moved(z: float, count: int = 4) -> Fit:
+    """A fit with one of several nominal parameters moved by z tolerances."""
+    return Fit(DATA, {}, z * np.eye(1, count)[0], NOISY)
+
+
+def test_the_further_off_a_nominal_parameter_is_the_less_probable_are_the_effects_beside_it() -> None:
+    factors = [farthest(moved(z)) for z in (0.0, 1.0, 2.0, 2.5, 3.0)]
+    assert factors == sorted(factors, reverse=True)
+    assert factors[0] == pytest.approx(1.0)
+    assert factors[1] > 0.95  # most laboratories have one
+    assert factors[-1] < 0.5
+
+
+def test_what_effects_may_leave_is_a_small_share_of_a_small_gap() -> None:
+    def search(gap: float) -> Search:
+        return Search(DATA, fit(NOISY + gap * GAP), fit(NOISY), ())
+
+    small, large = (float(allowed(search(gap))[0]) for gap in (1.0, 1e6))
+    assert 0.0 < small < 0.2
+    assert small < large == float(allowed(search(1e7))[0])
+
+
+def test_effects_that_leave_a_tenth_of_a_gap_are_as_probable_as_a_stand_in() -> None:
+    assert share_named(0.9) == pytest.approx(0.5)
+    assert share_named(1.0) == pytest.approx(1.0)
+    assert share_named(0.6) < share_named(0.95)
+
+
+def wandering(whole: Record, *names: str) -> Record:
+    """The record with slow noise on some readings, as loud beside their own as the wander of the stroke."""
+    damped = signal.tf2sos(
+        [1.0, 0.0, -1.0], np.poly(0.999 * np.exp(2j * np.pi * RESONANCE * 0.002 * np.array([1, -1]))).real
+    )
+    changed = {}
+    for number, name in enumerate(names):
+        slow = signal.sosfilt(damped, white(31 + number, whole.ticks))
+        scale = WANDER * whole.labs[1].noise[name] / whole.labs[1].noise["damper_stroke"]
+        changed[name] = whole.signals[name] + scale * slow / np.std(slow)
+    return replace(whole, signals=whole.signals | changed)
+
+
+def judged(whole: Record) -> PartVerdict:
+    """The verdict on the slave's laboratory where no effect is found."""
+    bare = settling.settled(fitting.fit(residuals.prepare(lab_b(whole), whole), {}))
+    return judge(Search(bare.data, bare, bare, ()))
+
+
+def test_loud_slow_noise_of_a_single_reading_may_be_an_unknown_effect(cases: Cases) -> None:
+    found = judged(wandering(cases.record(), "damper_stroke"))
+    assert (found.outcome, found.doubted) == ("unknown", "damper_stroke")
+    assert doubted([found])[0].startswith("What damper_stroke shows")
+
+
+def test_loud_slow_noise_of_several_readings_is_noise(cases: Cases) -> None:
+    whole = cases.record()
+    found = judged(wandering(whole, *whole.labs[1].measured))
+    assert (found.outcome, found.doubted) == ("tolerances", "")
+
+
+def test_an_effect_that_is_hardly_the_cause_stands_in_for_it() -> None:
+    entry = PartOfGap(
+        part="laboratory A",
+        outcome="partly",
+        effects=("actuator.delay",),
+        gap=0.1,
+        tolerances=0.0,
+        named=0.07,
+        left=0.03,
+        noise=0.01,
+        adequate=None,
+    )
+    assert wording.of_part(entry, likely=True) == "actuator delay explains a part and leaves 3.0 % of 10 %"
+    assert (
+        wording.of_part(entry, likely=False)
+        == "actuator delay may stand in for another cause and leaves 3.0 % of 10 %"
+    )
