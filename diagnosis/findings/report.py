@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import details, how_far, parts_table, rest, trust, where
+from diagnosis.findings import details, how_far, parts_table, rest, where
+from diagnosis.findings.certainty import trust
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.further_tests import exercise, next_test
 from diagnosis.findings.which import which

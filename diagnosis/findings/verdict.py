@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.hypothesis import TOLERANCES, Problem
+from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, exchanged_pair
 from diagnosis.fits.trade import tied
@@ -27,9 +27,6 @@ HALF = 0.5
 # that the true cause is not among the effects named, by outcome.
 TEMPERATURE = 3.0
 DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}
-# s, blocks over which gradients are summed: several periods of the slowest motion of a residual.
-CORRELATED = 2.0
-COVER = 1.96  # standard deviations of an interval of 95 %
 BOTH = 2.0  # solutions with an error of their own: the laboratory's and the replay's
 MOST_LEFT = 0.2  # of a gap's rms that effects may leave as an error of such solutions: 4 % of its energy
 # Share of a gap's rms that may be taken for coloured noise where only the residual itself is evidence: a sixth of its
@@ -47,17 +44,6 @@ PINNED = 1e-3
 
 
 @dataclass(frozen=True)
-class Interval:
-    """A parameter with its interval."""
-
-    value: float
-    low: float
-    high: float
-    unit: str
-    on_bound: bool
-
-
-@dataclass(frozen=True)
 class PartVerdict:
     """The verdict on one part."""
 
@@ -70,9 +56,9 @@ class PartVerdict:
     doubted: str = ""  # the reading of which the gap might also be slow noise, empty for none
 
     @property
-    def fitted(self) -> Fit:
-        """The chosen effects where their parameters were found: in all recordings."""
-        return (self.joined or self.search).chosen
+    def searched(self) -> Search:
+        """Where the effects and their parameters were found: in all recordings."""
+        return self.joined or self.search
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -90,22 +76,24 @@ def judge(search: Search) -> PartVerdict:
     outcome = how_well(search)
     if outcome == "unknown" or (outcome == "partly" and strain(search) < HALF):
         return unnamed(search)
-    chosen = search.chosen
-    noise = max(1.0, chosen.chi / chosen.reduced.size)
-    odds = [
-        math.exp(-min(max((other.cost - chosen.cost) / noise, 0.0) / (2.0 * TEMPERATURE), 700.0))
-        for other in search.alternatives
-    ]
-    same = [tied(chosen, other) for other in search.alternatives]
-    whole = 1.0 + sum(odds)
-    named = (1.0 + sum(value for value, yes in zip(odds, same, strict=True) if yes)) / whole
+    chances = odds(search)
+    same = [tied(search.chosen, other) for other in search.alternatives]
+    whole = 1.0 + sum(chances)
+    named = (1.0 + sum(value for value, yes in zip(chances, same, strict=True) if yes)) / whole
     sure = (1.0 - DOUBT[outcome]) * certainty(search)
     others = tuple(
         (other, sure * value / whole)
-        for other, value, yes in zip(search.alternatives, odds, same, strict=True)
+        for other, value, yes in zip(search.alternatives, chances, same, strict=True)
         if not yes
     )
     return PartVerdict(search, outcome, sure * named, others, equivalents(search))
+
+
+def odds(search: Search) -> list[float]:
+    """How probable each alternative is, over the chosen effects."""
+    noise = max(1.0, search.chosen.chi / search.chosen.reduced.size)
+    worse = [max((other.cost - search.chosen.cost) / noise, 0.0) for other in search.alternatives]
+    return [math.exp(-min(one / (2.0 * TEMPERATURE), 700.0)) for one in worse]
 
 
 def seen_in(data: Data, verdict: PartVerdict) -> PartVerdict:
@@ -281,61 +269,3 @@ def equivalents(search: Search) -> tuple[tuple[str, ...], ...]:
     for come, (_, gone) in nearest.items():
         sets.setdefault(gone, [gone]).append(come)
     return tuple(map(tuple, sets.values()))
-
-
-def scatter(fit: Fit) -> Array:
-    """How much the gradient varies beyond white noise, from its sums over blocks (White 1980, Newey and West 1987).
-
-    What a model leaves changes slowly, so that neighbouring samples are not independent.
-    """
-    groups, signals = fit.reduced.shape
-    seen_by_fit = np.where(fit.data.train[:, None], fit.reduced, 0.0)
-    block = max(1, round(CORRELATED / (fit.data.system.plan.test.interval * fit.data.group)))
-    count = groups // block
-    seen_slopes = on_train(fit)
-    white = seen_slopes.T @ seen_slopes
-    if count < 4:
-        return white
-    slopes = fit.jacobian.reshape(groups, signals, -1)[: count * block]
-    steps = np.einsum("gs,gsp->gp", seen_by_fit[: count * block], slopes)
-    sums = steps.reshape(count, block, -1).sum(axis=1)
-    seen: Array = sums.T @ sums - white
-    values, vectors = np.linalg.eigh(0.5 * (seen + seen.T))
-    return (vectors * np.maximum(values, 0.0)) @ vectors.T
-
-
-def on_train(fit: Fit) -> Array:
-    """The slopes of the residuals that the fit has seen, (groups·signals of these, parameters)."""
-    return np.asarray(fit.jacobian[np.repeat(fit.data.train, fit.data.sigma.size)])
-
-
-def covariance(fit: Fit) -> Array:
-    """Covariance of what a fit moved: nominal parameters, in tolerances, and then the parameters of effects.
-
-    It comes from the curvature of the cost that the fit saw and the scatter of that cost's gradient.
-    """
-    count, slopes = fit.z.size, on_train(fit)
-    information = slopes.T @ slopes
-    information[:count, :count] += np.eye(count)
-    inverse = np.linalg.pinv(information + 1e-12 * np.trace(information) * np.eye(len(information)))
-    return np.asarray(inverse + inverse @ scatter(fit) @ inverse)
-
-
-def intervals(fit: Fit) -> dict[str, dict[str, Interval]]:
-    """Parameters of a fit's effects with their 95 % intervals, from the curvature of the cost that it saw."""
-    count = fit.z.size
-    problem = Problem(fit.data, fit.values)
-    spread = covariance(fit)
-    result: dict[str, dict[str, Interval]] = {}
-    low, high = problem.bounds()
-    place = problem.place(fit.values, fit.z)
-    for i, item in enumerate(problem.frees, start=count):
-        wide = COVER * math.sqrt(max(spread[i, i], 0.0))
-        ends = [item.outward(float(np.clip(place[i] + side * wide, low[i], high[i]))) for side in (-1, 1)]
-        value = fit.values[item.effect][item.parameter.name]
-        edge = 1e-6 * (high[i] - low[i])
-        bound = not low[i] + edge < place[i] < high[i] - edge
-        result.setdefault(item.effect, {})[item.parameter.name] = Interval(
-            value, min(ends), max(ends), item.parameter.unit, bound
-        )
-    return result

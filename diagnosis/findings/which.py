@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.findings import trust
+from diagnosis.findings.certainty import trust
+from diagnosis.findings.certainty.intervals import Interval, intervals
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import Interval, PartVerdict, intervals
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps
@@ -44,7 +45,7 @@ def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Na
     probability = min(sure, likely)
     if not effects:
         probability = min(probability, nothing(found))
-    fits = {name: values for verdict in named for name, values in intervals(verdict.fitted).items()}
+    fits = {name: values for verdict in named for name, values in intervals(verdict).items()}
     catalogue = found.record.catalogue
     laws = {
         name: chosen_law(values) for verdict in named for name, values in verdict.search.chosen.values.items()

@@ -50,6 +50,11 @@ class Fit:
         return problem.jacobian(problem.place(self.values, self.z), self.reduced.ravel())
 
     @property
+    def seen_slopes(self) -> Array:
+        """The slopes of the residuals that the fit has seen, (groups·signals of these, parameters)."""
+        return np.asarray(self.jacobian[np.repeat(self.data.train, self.data.sigma.size)])
+
+    @property
     def prior(self) -> float:
         """Σ z²."""
         return float(self.z @ self.z)
@@ -82,11 +87,15 @@ def fit(
     """
     found = at(data, start, z if z is not None else np.zeros(len(data.part.nuisances)))
     for _ in range(rounds):
-        missed = np.maximum(1.0, np.mean(np.square(found.reduced), axis=0))
-        before, found = found, moved(data, found, steps, slopes, 1.0 / np.sqrt(missed))
+        before, found = found, moved(data, found, steps, slopes, weights(found))
         if abs(before.chi - found.chi) < 1.0 + 1e-3 * excess(found):
             break
     return found
+
+
+def weights(fit: Fit) -> Array:
+    """Weights of the signals' residuals (signals,): less than one for a signal that a fit misses by more than noise."""
+    return np.asarray(1.0 / np.sqrt(np.maximum(1.0, np.mean(np.square(fit.reduced), axis=0))))
 
 
 def excess(fit: Fit) -> float:
@@ -135,12 +144,16 @@ def begun(fit: Fit) -> Fit:
 
 
 def polished(found: Fit) -> Fit:
-    """A fit that leaves something moved on to its end, from where it is and with its laws in their usual shape."""
+    """A fit that leaves something moved on to its end, from where it is and with its laws in their usual shape.
+
+    Nominal parameters that stand in for what the effects had not reached yet begin near their plan's values again.
+    """
+    z = np.clip(found.z, -NEAR, NEAR)
     usual = {
         name: values
         | {item.name: item.default for item in found.data.catalogue[name].parameters if item.default}
         for name, values in found.values.items()
     }
     starts = [found.values, usual] if usual != found.values else [found.values]
-    fits = [fit(found.data, values, found.z, POLISHED, rounds=3) for values in starts]
+    fits = [fit(found.data, values, z, POLISHED, rounds=3) for values in starts]
     return min([found, *fits], key=lambda item: item.cost)

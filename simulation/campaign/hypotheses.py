@@ -11,7 +11,7 @@ import numpy as np
 
 from common.roles import MASTER
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import DOUBT, PartVerdict, on_train
+from diagnosis.findings.verdict import DOUBT, PartVerdict
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
@@ -49,7 +49,7 @@ class PartCauses:
 
 def information(fit: Fit) -> Array:
     """The information (p, p) that a fit's recordings and the tolerances hold on all that it moved."""
-    slopes = on_train(fit)
+    slopes = fit.seen_slopes
     found = slopes.T @ slopes
     found[: fit.z.size, : fit.z.size] += np.eye(fit.z.size)
     return np.asarray(found)

@@ -10,9 +10,11 @@ import pytest
 
 from common.errors import InputError
 from diagnosis.diagnose import judged
-from diagnosis.findings.verdict import intervals
+from diagnosis.findings.certainty.intervals import intervals
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import Search
 from diagnosis.recorded.joined import JoinedPart, joined, refuse_others
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
@@ -78,7 +80,9 @@ def test_a_second_recording_narrows_the_confidence_interval(cases: Cases) -> Non
     widths = []
     for others in ([], [lab_b(second)]):
         data = residuals.prepare(joined(lab_b(first), others, 4), first)
-        found = intervals(fitting.fit(data, FRICTION))["damper.friction"]["force"]
+        fit = fitting.fit(data, FRICTION)
+        verdict = PartVerdict(Search(data, fit, fit, ()), "explained", 1.0, (), ())
+        found = intervals(verdict)["damper.friction"]["force"]
         assert found.low < 3.0 < found.high
         widths.append(found.high - found.low)
     assert widths[1] < 0.9 * widths[0]

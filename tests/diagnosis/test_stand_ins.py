@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 
 from diagnosis.diagnose import doubted
-from diagnosis.findings.trust import share_named
+from diagnosis.findings.certainty.trust import share_named
 from diagnosis.findings.verdict import PartVerdict, allowed, farthest, judge
 from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.fitting import Fit

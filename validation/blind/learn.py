@@ -1,8 +1,8 @@
 """Learning the probability of a verdict: `python -m validation.blind.learn RESULTS …`.
 
 RESULTS are `results.json` of trials (`rths blind --json` or its folder), of the sets that tune and not of "judge". It
-writes the weights as `diagnosis.findings.trust` holds them, and how good probabilities are on cases that the weights
-were not learned from, by kind of case.
+writes the weights as `diagnosis.findings.certainty.trust` holds them, and how good probabilities are on cases that the
+weights were not learned from, by kind of case.
 
 The model is a logistic regression with an L2 penalty on standardised signs. A weight whose sign contradicts what the
 sign means is zero: more noise left, or more effects named, never make a verdict more probable. The penalty is that with
@@ -24,7 +24,7 @@ from scipy.special import expit
 
 from common.errors import InputError
 from common.terminal import cli
-from diagnosis.findings.trust import SIGNS, Weights
+from diagnosis.findings.certainty.trust import SIGNS, Weights
 from models.registry import Array
 from report.text import terminal
 from validation.blind.results.calibration import brier, expected_calibration_error

@@ -11,9 +11,10 @@ from scipy.signal import hilbert
 
 from common.reality.spread import ByRole, SeenRange, Spread, UncertainParameter
 from common.roles import MASTER
+from diagnosis.findings.certainty.intervals import covariance
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.gaps import RecordingGaps, held_out
-from diagnosis.findings.verdict import PartVerdict, covariance
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
 from diagnosis.recorded.loop import NOISY, noised
@@ -60,7 +61,7 @@ def spread(found: Mapping[str, Diagnosis]) -> Spread:
 
 def part_spread(found: Diagnosis, verdict: PartVerdict) -> PartSpread:
     """The parameters that the fit of a part moved, those of the recording alone left out."""
-    fit = verdict.fitted
+    fit = verdict.searched.chosen
     problem = Problem(fit.data, fit.values)
     known: list[tuple[int, UncertainParameter, float]] = [*nominal(fit), *of_effects(found, fit, problem)]
     places = [place for place, _, _ in known]

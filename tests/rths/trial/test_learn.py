@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.findings.trust import SIGNS
+from diagnosis.findings.certainty.trust import SIGNS
 from validation.blind import learn
 from validation.blind.learn import Verdicts
 

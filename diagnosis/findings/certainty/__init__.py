@@ -1,0 +1,1 @@
+"""How sure a verdict is: its probability, and the intervals of its parameters."""
