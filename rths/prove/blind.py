@@ -92,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
     from validation.blind.draw import draw
     from validation.blind.predicted.next_test import next_test
     from validation.blind.predicted.results import measures as of_predictions
+    from validation.blind.predicted.results import with_stated
     from validation.blind.progress import SCHEMA, TABLE, CasesDone
     from validation.blind.progress import table as table_of
     from validation.blind.results.measures import measures
@@ -121,7 +122,8 @@ def run(args: argparse.Namespace) -> int:
                 folder,
             )
         following = [next_test(case, args.seed, args.set, trial) for case in cases] if args.predict else []
-        predicted = predict_cases(following, recorded, Path(place), args, progress.tell)
+        foretold = predict_cases(following, recorded, Path(place), args, progress.tell)
+        predicted = with_stated(foretold, outcomes)
         found = write(folder, outcomes, about, predicted)
         write_table(folder / TABLE, table_of(cases, found["cases"]), force=True)
     table = [*measures(outcomes), *(of_predictions(predicted) if predicted else ())]

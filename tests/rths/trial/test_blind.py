@@ -157,7 +157,12 @@ def test_the_next_test_of_every_case_is_predicted_and_judged(
     assert code == 0  # too few cases to say that a goal is missed
     assert "prediction: error after / before, median" in out
     assert "Predictions of the next test" in (tmp_path / "out" / "index.html").read_text()
-    assert [one["goal"] for one in found["measures"]] == ["≤ 0.100", "≤ 0.500", "85.0 % to 95.0 %"]
+    assert [one["goal"] for one in found["measures"]] == [
+        "≤ 0.100",
+        "≤ 0.500",
+        "85.0 % to 95.0 %",
+        "≥ 90.0 %",
+    ]
     for one in found["cases"]:
         assert one["ratio"] == pytest.approx(
             1.0, abs=0.1
@@ -182,8 +187,8 @@ def test_a_next_test_is_the_same_every_time_and_a_failed_prediction_counts(tmp_p
     outcome = predict((one, tmp_path / "none.toml"))
     assert "No such file" in outcome.error
     assert outcome.ratio == math.inf
-    median, worst, inside = predictions.measures([outcome])
-    assert (median.value, worst.value, inside.count) == (math.inf, math.inf, 0)
+    median, worst, inside, agrees = predictions.measures([outcome])
+    assert (median.value, worst.value, inside.count, agrees.count) == (math.inf, math.inf, 0, 0)
 
 
 def test_the_goal_of_a_mean_share_is_judged_by_its_interval() -> None:

@@ -32,6 +32,7 @@ from simulation.prediction import bands, draws, file, held
 from simulation.prediction.rest import BEYOND, OUTSIDE
 from simulation.workers.pool import spread
 from validation.blind.cases.names import CaseNames
+from validation.blind.predicted.closed import closed
 from validation.blind.predicted.next_test import FollowingTest, PlayedTest, Readings, play
 from validation.blind.size import levels
 from validation.blind.worker import ENDINGS
@@ -53,6 +54,10 @@ class PredictedCase:
     )
     said: list[str]  # sentences of the prediction and of the comparison with the recorded test
     signals: Mapping[str, float] = field(default_factory=dict)  # share inside by signal
+    closed: float = (
+        math.nan
+    )  # share of the gap that the effects found close in this test; NaN where it is not judged
+    stated: float = math.nan  # that share as the report stated it; NaN where it named nothing
     # Where the prediction states that the test leaves the observed range, by role: how many times the largest
     # amplitude, and which share of the target's energy lies at other frequencies.
     farther: Mapping[str, float] = field(default_factory=dict)
@@ -76,9 +81,8 @@ def predict(work: tuple[FollowingTest, Path], kept: Path | None = None) -> Predi
     plan = plans.from_tables(case.plan, Path())
     with tempfile.TemporaryDirectory(prefix="rths-next-") as place:
         played = play(following, Path(place))
-        before = error(
-            plan, really(as_planned(plan), noise=False), played.silent, case_levels(following, plan)
-        )
+        noise = case_levels(following, plan)
+        before = error(plan, really(as_planned(plan), noise=False), played.silent, noise)
         names = CaseNames(plan)
         about: dict[str, Any] = {
             "index": case.index,
@@ -90,7 +94,9 @@ def predict(work: tuple[FollowingTest, Path], kept: Path | None = None) -> Predi
             "stopped": played.stopped,
         }
         try:
-            prediction = bands.predict(draws.load(found, plan), plan)
+            laboratories = draws.load(found, plan)
+            prediction = bands.predict(laboratories, plan)
+            closes = closed(laboratories, plan, played.silent, noise)
         except RthsError as problem:
             return PredictedCase(**about, after=math.inf, inside=math.nan, said=[], error=str(problem))
         written = Path(place) / "predicted.mcap"
@@ -100,8 +106,9 @@ def predict(work: tuple[FollowingTest, Path], kept: Path | None = None) -> Predi
             keep(kept / f"case-{case.index:05d}", found, played, written)
     return PredictedCase(
         **about,
-        after=error(plan, prediction.middle, played.silent, case_levels(following, plan)),
+        after=error(plan, prediction.middle, played.silent, noise),
         inside=came_out.inside,
+        closed=closes,
         said=[*prediction.sentences, *said.sentences(came_out)],
         signals={name: one.inside for name, one in came_out.signals.items()},
         farther={role: one.ratio for role, one in prediction.reaches.items() if one.ratio > BEYOND},

@@ -4,20 +4,41 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
 from report.text.formats import MISSING, percent, quantity
 from validation.blind.predicted.predict import PredictedCase
-from validation.blind.results.measures import Measure, as_plain, quantile
+from validation.blind.results.measures import Measure, as_plain, quantile, rate
+from validation.blind.results.scoring import Outcome
 
-HEAD = ("case", "kind", "hidden", "next test", "before", "after", "after / before", "inside", "remarks")
+HEAD = (
+    "case",
+    "kind",
+    "hidden",
+    "next test",
+    "before",
+    "after",
+    "after / before",
+    "inside",
+    "closed",
+    "remarks",
+)
 # The goals: what is left of the error in the median and in the worst tenth of the cases, and the share of the time
 # that bands of 90 % hold, over cases.
 MEDIAN, WORST_TENTH = 0.1, 0.5
 HELD = (0.85, 0.95)
+# Share of the cases in which the share of the gap that closes is stated within `NEAR` of what it is in the next test.
+AGREES, NEAR = 0.9, 0.1
 SURE = 1.96  # standard errors of a mean on both sides, for an interval of 95 %
+
+
+def with_stated(cases: Sequence[PredictedCase], outcomes: Sequence[Outcome]) -> list[PredictedCase]:
+    """The predictions with the share of the gap that each report stated to close where it names effects."""
+    said = {one.index: one.closed for one in outcomes if one.verdict and not one.twice}
+    return [replace(one, stated=said.get(one.index, math.nan)) for one in cases]
 
 
 def measures(cases: Sequence[PredictedCase]) -> list[Measure]:
@@ -27,6 +48,12 @@ def measures(cases: Sequence[PredictedCase]) -> list[Measure]:
         quantile("prediction: error after / before, median", ratios, most=MEDIAN),
         quantile("prediction: error after / before, worst tenth", ratios, 0.9, most=WORST_TENTH),
         share_inside([one.inside for one in cases if not math.isnan(one.inside)]),
+        rate(
+            f"prediction: closed as stated, within {NEAR:g}",
+            [one for one in cases if not math.isnan(one.closed + one.stated)],
+            lambda one: abs(one.closed - one.stated) <= NEAR,
+            AGREES,
+        ),
     ]
 
 
@@ -56,6 +83,7 @@ def cells(one: PredictedCase) -> tuple[str, ...]:
         percent(one.after, 2) if math.isfinite(one.after) else MISSING,
         quantity(one.ratio, "") if math.isfinite(one.ratio) else MISSING,
         percent(one.inside, 0) if not math.isnan(one.inside) else MISSING,
+        MISSING if math.isnan(one.closed + one.stated) else f"{one.closed:.2f} ({one.stated:.2f} stated)",
         "; ".join(filter(None, remarks)),
     )
 
@@ -69,8 +97,6 @@ def beyond(one: PredictedCase) -> str:
 
 def results(cases: Sequence[PredictedCase]) -> dict[str, Any]:
     """Everything that is written as JSON."""
-    from dataclasses import asdict
-
     table = [asdict(item) | {"goal": item.goal, "verdict": item.verdict} for item in measures(cases)]
     rows = [asdict(one) | {"ratio": one.ratio} for one in cases]
     plain: dict[str, Any] = as_plain({"measures": table, "cases": rows})

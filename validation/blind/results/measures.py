@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from validation.blind.results.calibration import reliability as stated_and_obser
 from validation.blind.results.rows import case_rows
 from validation.blind.results.scoring import JudgedEstimate, Outcome
 from validation.blind.results.stated import brier_score, in_columns, stated_verdicts
+
+Judged = TypeVar("Judged")
 
 ABSTAINING = ("unknown_effect", "not_enough_data", "ambiguous")
 GOALS = 9  # judged at once; their thresholds are those of ADR 0012
@@ -85,8 +87,8 @@ def reached(hits: int, count: int, share: float) -> bool | None:
 
 def rate(
     name: str,
-    cases: Sequence[Outcome],
-    good: Callable[[Outcome], bool],
+    cases: Sequence[Judged],
+    good: Callable[[Judged], bool],
     least: float | None = None,
 ) -> Measure:
     """A share of cases with its Wilson interval."""
