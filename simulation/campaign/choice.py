@@ -28,6 +28,11 @@ FROM_THE_LEAST = (
     "It has the smallest drift, from which the drift may grow by the factor that the limits allow."
 )
 
+TO_LOOK = (
+    "The diagnosis leaves a gap for which its catalogue has no cause, so that it cannot be predicted which test tells "
+    "more; of the tests within the limits this one has the largest drift."
+)
+
 CERTAIN, INSEPARABLE, GAP, TESTS, LIMITS, SILENT = (
     "certain",
     "inseparable",
@@ -52,6 +57,11 @@ def least(options: Sequence[Option], _test: int) -> Option:
     return min(options, key=lambda one: (one.drift, one.candidate))
 
 
+def farthest(options: Sequence[Option]) -> Option:
+    """The option with the largest drift."""
+    return max(options, key=lambda one: (one.drift, -one.candidate))
+
+
 def at_random(seed: int, options: Sequence[Option], test: int) -> Option:
     """An option at random, the same for the same seed and number of the test."""
     return options[int(np.random.default_rng([seed, test]).integers(len(options)))]
@@ -68,7 +78,22 @@ def choose(head: GoalTable, pick: Pick, gentle: bool, steps: Sequence[Step]) -> 
     if isinstance(last, BegunStep):
         return first(least if gentle else pick, last)
     assert isinstance(last, DiagnosedStep)  # noqa: S101 - no other step asks for a choice
-    return end(head, last) or following(pick, steps, last)
+    look = newly_left(steps)
+    return end(head, last) or (None if look else settled(head, last)) or following(pick, steps, last, look)
+
+
+def newly_left(steps: Sequence[Step]) -> bool:
+    """Whether the last diagnosis leaves a gap without a cause, and the one before it did not.
+
+    What one motion leaves may be a wrong cause or an effect that a further test shows, so no campaign ends on it.
+    """
+    left = [leaves(one) for one in steps if isinstance(one, DiagnosedStep)]
+    return left[-1] and not any(left[-2:-1])
+
+
+def leaves(one: DiagnosedStep) -> bool:
+    """Whether a diagnosis leaves a gap without a cause."""
+    return any(status in one.status for status in LEAVING)
 
 
 def first(pick: Pick, begun: BegunStep) -> DecidedStep | EndedStep:
@@ -82,12 +107,23 @@ def first(pick: Pick, begun: BegunStep) -> DecidedStep | EndedStep:
 
 
 def end(head: GoalTable, last: DiagnosedStep) -> EndedStep | None:
-    """The end that a diagnosis makes; None where another test is asked for."""
+    """The end that a diagnosis makes whatever was before it; None where another test is asked for."""
     if head.gap > 0.0 and last.gap <= head.gap:
         return EndedStep(
             GAP,
             f"The gap that is left, {100.0 * last.gap:.2g} %, is within the {100.0 * head.gap:.2g} % asked for.",
         )
+    played = last.test >= head.tests
+    found = settled(head, last) if played or not leaves(last) else None
+    if found is None and played:
+        return EndedStep(
+            TESTS, f"All {head.tests} tests are played; the most probable cause is {likely(last)}."
+        )
+    return found
+
+
+def settled(head: GoalTable, last: DiagnosedStep) -> EndedStep | None:
+    """The end where the cause, or a set of causes that no test tells apart, has the probability that was asked for."""
     top = last.causes[0]
     if top.probability >= head.certain:
         return EndedStep(
@@ -99,21 +135,23 @@ def end(head: GoalTable, last: DiagnosedStep) -> EndedStep | None:
             f"No test within these limits can tell {' from '.join(map(named, last.same))}; one of them is the cause, "
             f"with {percent(last.together)}.",
         )
-    if last.test >= head.tests:
-        return EndedStep(
-            TESTS, f"All {head.tests} tests are played; the most probable cause is {likely(last)}."
-        )
     return None
 
 
-def following(pick: Pick, steps: Sequence[Step], last: DiagnosedStep) -> DecidedStep | EndedStep:
-    """The next test, or the end where none may be played or none tells anything."""
+def following(pick: Pick, steps: Sequence[Step], last: DiagnosedStep, look: bool) -> DecidedStep | EndedStep:
+    """The next test, or the end where none may be played or none tells anything.
+
+    Of a gap without a cause nothing can be predicted: with `look` it is looked at in the test that shows most.
+    """
     played = {one.candidate for one in steps if isinstance(one, DecidedStep)}
     new = [one for one in last.options if one.candidate not in played]
     left = [one for one in new if not one.refused]
     if not left:
         return none_left(new)
     if max(one.bits for one in left) < LEAST:
+        if look:
+            chosen = farthest(left) if pick is best else pick(left, last.test + 1)
+            return DecidedStep(last.test + 1, chosen.candidate, chosen.bits, TO_LOOK)
         return EndedStep(
             SILENT,
             "No test within these limits tells more about the cause than is known; the most probable one is "
@@ -125,7 +163,7 @@ def following(pick: Pick, steps: Sequence[Step], last: DiagnosedStep) -> Decided
 
 def without_cause(last: DiagnosedStep) -> str:
     """Why no further test helps where a diagnosis leaves a gap without a cause; empty where it leaves none."""
-    if not any(one in last.status for one in LEAVING):
+    if not leaves(last):
         return ""
     return (
         f" The diagnosis leaves a gap, of up to {percent(last.gap)}, for which its catalogue has no cause. What a test "
