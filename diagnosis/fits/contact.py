@@ -7,7 +7,7 @@ stiffness is lengthened which fits best shortly after the first contact.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -60,9 +60,14 @@ def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
         further = [under for values in best for under in further_laws(effect, values)]
         begun = [*starts, *further]
         fits = list(pool.map(lambda start: grown(data, fit, effect, start, groups), begun))
-    springs = [item for item in fits if not item.values[effect.name].get("law")]
-    others = [item for item in fits if item not in springs]
+    springs, others = by_law(fits, effect.name)
     return laws.simplest(min(springs, key=laws.cost), others)
+
+
+def by_law(fits: Sequence[Fit], name: str) -> tuple[list[Fit], list[Fit]]:
+    """The fits under the first law of an effect, and those under its others."""
+    others = [item for item in fits if item.values[name].get("law")]
+    return [item for item in fits if not item.values[name].get("law")], others
 
 
 def further_laws(effect: Effect, values: Mapping[str, float]) -> list[dict[str, float]]:
