@@ -10,9 +10,12 @@ from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
-from diagnosis.fits.unexplained import remaining
+from diagnosis.fits.unexplained import leaves, remaining
 
 MOST = 3  # effects of one part: more of them can imitate any residual
+# Effects of one part that leave only noise, each of them needed for that; the share of what is left that each must
+# explain on the way. Of 12 gaps of unknown effects and other formulas none was taken for such a set (set "tune").
+TOGETHER, STEP_OF_LEFT = 6, 0.3
 HALVINGS = 20  # by which a value is found beyond which the system is the same
 
 
@@ -50,6 +53,8 @@ def search(data: Data, scales: Scales) -> Search:
     if not chosen.names:
         return Search(bare.data, bare, chosen, ())
     chosen, as_good = trade.traded(bare, pruned(bare, chosen), first, scales, MOST)
+    if remaining(chosen) < worth.LOUD:  # what leaves more has not found its largest effects yet
+        chosen = together(chosen, scales)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
     return physical(Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others))))
 
@@ -72,6 +77,33 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
             break
         better = candidates.best_laws(chosen, scales)
     return bare, chosen, first
+
+
+def together(chosen: Fit, scales: Scales) -> Fit:
+    """The effects chosen with further ones where all together leave nothing that can be seen; else those chosen.
+
+    Beside an effect of a thousand times the noise, one of twenty times the noise explains too little of the whole gap
+    to be worth it, and so nothing behind it is found either. But effects that are not there hardly leave only noise.
+    """
+    fit = chosen
+    while leaves(fit) and len(fit.names) < TOGETHER:
+        further = candidates.best_laws(fit, scales)
+        if not further or excess(further[0]) > (1.0 - STEP_OF_LEFT) * excess(fit):
+            break
+        fit = further[0]
+    if len(fit.names) == len(chosen.names) or remaining(fit) > worth.SEEN:
+        return chosen
+    fit = needed(fit)
+    usual = fit.prior < max(worth.SUSPICIOUS, chosen.prior)
+    return fit if usual and len(fit.names) > len(chosen.names) else chosen
+
+
+def needed(fit: Fit) -> Fit:
+    """The fit without effects without which nothing that can be seen is left either."""
+    for name in fit.names:
+        if len(fit.names) > 1 and remaining(less := candidates.without(fit, name)) < worth.SEEN:
+            fit = less
+    return fit
 
 
 def pruned(bare: Fit, fit: Fit) -> Fit:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.fits import candidates, fitting, residuals, unexplained
+from diagnosis.fits import candidates, fitting, residuals, unexplained, worth
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import search
+from diagnosis.fits.search import search, together
 from laboratories.effects import CATALOGUE
-from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, named, white
+from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, lab_b, named, white
 
 ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth, relative error allowed
     ("ground.scale", {"factor": 1.08}, {"factor": 0.005}),
@@ -152,3 +152,15 @@ def test_a_reading_that_saturates_is_also_looked_for_above_what_was_reached(case
     limits = [values["limit"] for _, values in scales.starts(effect)]
     peak = scales.peak("column_force")
     assert min(limits) < peak < 2.0 * peak < max(limits)
+
+
+def test_an_effect_that_is_small_beside_another_is_named_where_both_leave_only_noise(cases: Cases) -> None:
+    effects = {"damper.offset": {"force": 40.0}, "table.gain": {"factor": 0.97}}
+    found = cases.record(effects, duration=8.0)
+    part = lab_b(found)
+    part.candidates = tuple(one for one in part.candidates if one.name in {*effects, "damper.viscous"})
+    data, scales = residuals.prepare(part, found), Scales(found)
+    alone = fitting.fit(data, {"damper.offset": effects["damper.offset"]})
+    assert not worth.refines(fitting.fit(data, {}), alone, fitting.fit(data, effects))
+    assert set(together(alone, scales).names) == set(effects)
+    assert set(together(fitting.fit(data, effects), scales).names) == set(effects)
