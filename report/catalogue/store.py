@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import sqlite3
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -40,6 +41,11 @@ def opened(path: Path, *, create: bool = False) -> Iterator[sqlite3.Connection]:
                 made(base)
             yield base
     except sqlite3.Error as error:
+        if create and not os.access(path if path.exists() else path.parent, os.W_OK):
+            raise InputError(
+                f"Cannot write the catalogue {path}: you may not write there; name a folder of your own first, where "
+                "the catalogue then lies, and this one after it."
+            ) from None
         raise InputError(
             f"Cannot use the catalogue {path}: {error}; if it is damaged, delete it and make it anew."
         ) from None

@@ -213,6 +213,17 @@ def test_a_file_that_is_not_a_catalogue_is_refused_in_one_sentence(
     assert "Cannot use the catalogue" in capsys.readouterr().err
 
 
+def test_a_folder_that_may_not_be_written_is_named_with_the_remedy(
+    call: Call, capsys: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / store.NAME).mkdir()  # which SQLite cannot open, whoever runs the tests
+    monkeypatch.setattr("report.catalogue.store.os.access", lambda *_: False)
+    assert call("catalog", tmp_path) == 2
+    err = capsys.readouterr().err
+    assert "you may not write there; name a folder of your own first" in err
+    assert "delete it" not in err
+
+
 def test_the_page_of_the_catalogue_sorts_and_filters(call: Call, folder: Path, tmp_path: Path) -> None:
     if browser.chromium() is None:
         pytest.skip("there is no Chromium on this machine")
