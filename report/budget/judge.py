@@ -63,18 +63,18 @@ def limited(budget: Budget) -> list[str]:
 
 def unfitness(found: Figures, machine: MachineLimits) -> list[str]:
     """A sentence for each reason not to judge values over their limits; none where the machine is fit."""
-    said = [
+    remarks = [
         f"The host took {percent(share, 1)} of the processors' time of the {lab}: "
         f"beyond {percent(machine.stolen_share, 1)} nothing over its limit is judged."
         for lab, share in found.stolen.items()
         if share > machine.stolen_share
     ]
     if late_share(found) > machine.unfit_share:
-        said.append(
+        remarks.append(
             f"The bare loop itself was late in {percent(late_share(found), 2)} of its ticks: "
             f"beyond {percent(machine.unfit_share, 2)} nothing over its limit is judged."
         )
-    return said
+    return remarks
 
 
 def unsteadiness(found: Figures, machine: MachineLimits) -> list[str]:
@@ -94,14 +94,16 @@ def late_share(found: Figures) -> float:
 
 def remarks(found: Figures, budget: Budget, checks: list[BudgetCheck]) -> list[str]:
     """A sentence for each limit that was not judged, or judged with less data than the budget assumes."""
-    said = []
+    remarks = []
     if gone := [name for item in found.exchanges if not item.silent for name in absent(item, budget)]:
-        said.append(f"The recording has no value of {', '.join(gone)}: not judged.")
+        remarks.append(f"The recording has no value of {', '.join(gone)}: not judged.")
     if short := [check.name for check in checks if check.verdict == SHORT]:
-        said.append(f"Too few ticks for {', '.join(short)}: fewer than {LEAST_BEYOND} values lie beyond.")
+        remarks.append(f"Too few ticks for {', '.join(short)}: fewer than {LEAST_BEYOND} values lie beyond.")
     if found.bare is None and any(check.verdict == OVER for check in checks):
-        said.append("No bare loop was recorded, so a slow machine cannot be distinguished from a slow test.")
-    return said
+        remarks.append(
+            "No bare loop was recorded, so a slow machine cannot be distinguished from a slow test."
+        )
+    return remarks
 
 
 def absent(item: ExchangeTicks, budget: Budget) -> list[str]:

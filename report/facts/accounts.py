@@ -45,14 +45,14 @@ def accounts(run: Run) -> dict[str, dict[str, int]]:
     Each end counts what it sent, and the fate of what it received. A direction is left out where one of its ends has
     not reported its counts, because it was killed or cut off.
     """
-    told: dict[str, dict[str, float]] = {}  # by laboratory; the master reports each slave separately
+    counts: dict[str, dict[str, float]] = {}  # by laboratory; the master reports each slave separately
     for event in run.events:
         if event["code"] == "exchange":
-            told.setdefault(event["lab"], {}).update(event["values"])
+            counts.setdefault(event["lab"], {}).update(event["values"])
     found = {}
     answered = {lab.role: lab.channels.used_seq for lab in laboratories(run)}
     for role in run.roles:
-        master, slave = told.get(MASTER, {}), told.get(role, {})
+        master, slave = counts.get(MASTER, {}), counts.get(role, {})
         part = run.of(role)
         commands = beyond(part, SLAVE, "command_seq", MASTER)
         feedbacks = beyond(part, MASTER, answered.get(role, ""), SLAVE)
@@ -68,9 +68,9 @@ def accounts(run: Run) -> dict[str, dict[str, int]]:
     return found
 
 
-def extra(told: Mapping[str, float], prefix: str) -> int:
+def extra(counts: Mapping[str, float], prefix: str) -> int:
     """Frames that a receiver rejected because the sender cannot have sent them."""
-    return sum(int(told.get(f"{prefix}.turned_away.{reason}", 0)) for reason in (AHEAD, REPEATED))
+    return sum(int(counts.get(f"{prefix}.turned_away.{reason}", 0)) for reason in (AHEAD, REPEATED))
 
 
 def beyond(run: Run, receiver: str, name: str, sender: str) -> int:

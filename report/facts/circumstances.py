@@ -33,9 +33,9 @@ def clock_of(run: Run) -> str:
         return IMPORT
     if run.metadata.get("summary", {}).get("outcome") == "simulation":
         return SIMULATION
-    said = run.metadata.get(CLOCK, {}).get("kind", UNKNOWN)
-    if said in (VIRTUAL, REAL):
-        return said
+    clock = run.metadata.get(CLOCK, {}).get("kind", UNKNOWN)
+    if clock in (VIRTUAL, REAL):
+        return clock
     tables = (columns for topic, columns in run.columns.items() if kind_of(topic) == LATENCY)
     times = [columns["compute_time"] for columns in tables if "compute_time" in columns]
     known = np.concatenate([values[np.isfinite(values)] for values in times]) if times else np.array([])

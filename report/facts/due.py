@@ -30,8 +30,8 @@ def due(run: Run, plan: Plan | None) -> dict[str, int]:
         outcome(run.metadata.get("summary", {})) in WHOLE and not plan.served
     ):  # a client ends it when it likes
         return dict.fromkeys(topics, plan.ticks + held(run, plan, plan.ticks))
-    said = endings(run, plan.test.interval)
-    left = {topic: max(begun[topic], said[lab]) for topic in topics if (lab := laboratory(topic)) in said}
+    ends = endings(run, plan.test.interval)
+    left = {topic: max(begun[topic], ends[lab]) for topic in topics if (lab := laboratory(topic)) in ends}
     last = max([*begun.values(), *left.values()], default=0)
     most = plan.ticks + held(run, plan, last)
     return {topic: min(left.get(topic, last), most) for topic in topics}

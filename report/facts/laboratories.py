@@ -119,11 +119,11 @@ def laboratory(role: str, topic: str, plan: Plan | None, units: Mapping[str, str
         known = SHIPPED[kind]
         coupling = known.coupling(part) if part is not None else None
         return LaboratoryFacts(role, topic, known.channels, known.pictured, part, coupling)
-    channels = told(topic, units) if kind else None
+    channels = recorded_channels(topic, units) if kind else None
     return None if channels is None else LaboratoryFacts(role, topic, channels, usual(channels), part)
 
 
-def told(topic: str, units: Mapping[str, str]) -> Channels | None:
+def recorded_channels(topic: str, units: Mapping[str, str]) -> Channels | None:
     """The channels of a user's kind, by the order of its topic's fields; None where some are missing.
 
     The order is: target, force of a motor if there is one, command, measured signals. The first measured signal in the

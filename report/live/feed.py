@@ -273,9 +273,9 @@ class Feed:
             return "waiting for the recording to begin"
         if self.behind:
             return "reading what was recorded so far"
-        said = self.standing.gravest.replace("_", " ") or (Mode.RUNNING.value if self.t else "starting")
+        standing = self.standing.gravest.replace("_", " ") or (Mode.RUNNING.value if self.t else "starting")
         if self.silent and self.standing.latched:  # a laboratory that waits for its operator measures nothing
-            return f"{said}, t = {self.t:.2f} s; no news for {self.silent:.0f} s"
+            return f"{standing}, t = {self.t:.2f} s; no news for {self.silent:.0f} s"
         if self.silent:
-            return f"no news for {self.silent:.0f} s; the newest: {said}, t = {self.t:.2f} s"
-        return f"{said}, t = {self.t:.2f} s"
+            return f"no news for {self.silent:.0f} s; the newest: {standing}, t = {self.t:.2f} s"
+        return f"{standing}, t = {self.t:.2f} s"

@@ -104,21 +104,21 @@ def trips(timing: Timing) -> list[tuple[str, str, str, str]]:
 
 def heading(feed: Feed) -> str:
     """How the test stands; why it ended only where the banner does not say that already."""
-    told = {f"ended: {stop.text}" for stop in feed.standing.stops[:STOPS]}
-    return "ended" if feed.state in told else feed.state
+    stated = {f"ended: {stop.text}" for stop in feed.standing.stops[:STOPS]}
+    return "ended" if feed.state in stated else feed.state
 
 
 def standing(feed: Feed, lab: str) -> tuple[str, str, str]:
     """A laboratory's safety mode, its colour, and how old that news is."""
     mode = feed.standing.modes.get(lab, "–")
-    said, colour = mode.replace("_", " "), IN_MODE.get(mode, GREY)
+    word, colour = mode.replace("_", " "), IN_MODE.get(mode, GREY)
     t = feed.standing.last(lab)
     if t is None or feed.ended:
-        return said, colour, ""
+        return word, colour, ""
     age = feed.standing.age(lab)
     if age * 1e9 <= SILENT_NS or (mode != "–" and Mode(mode) in LATCHED):
-        return said, colour, f"as of t = {t:.2f} s, {age:.1f} s ago"
-    return said, colour if colour == RED else ORANGE, f"no news for {age:.0f} s, since t = {t:.2f} s"
+        return word, colour, f"as of t = {t:.2f} s, {age:.1f} s ago"
+    return word, colour if colour == RED else ORANGE, f"no news for {age:.0f} s, since t = {t:.2f} s"
 
 
 class EventLine(NamedTuple):

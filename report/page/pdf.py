@@ -58,8 +58,8 @@ def write(page: str, output: Path) -> None:
                 f"{program} has not printed {output} within {LIMIT_S:g} s: try again, or print the page by hand."
             ) from None
         if not printed.is_file():
-            said = done.stderr.decode(errors="replace").strip().splitlines()
+            errors = done.stderr.decode(errors="replace").strip().splitlines()
             raise InputError(
-                f"{program} could not print {output}: {said[-1] if said else 'it does not say why'}."
+                f"{program} could not print {output}: {errors[-1] if errors else 'it does not say why'}."
             )
         shutil.copyfile(printed, output)

@@ -252,12 +252,12 @@ def provenance(run: Run, summary: Summary) -> list[tuple[str, str]]:
 
 def kept(run: Run) -> list[tuple[str, str]]:
     """Everything else that the recording says about itself, by title, as text."""
-    said = [
+    texts = [
         (name, "\n".join(f"{key} = {text}" for key, text in values.items()))
         for name, values in run.metadata.items()
         if name not in SHOWN
     ]
-    return [(f"metadata: {name.replace('_', ' ')}", text) for name, text in said if text]
+    return [(f"metadata: {name.replace('_', ' ')}", text) for name, text in texts if text]
 
 
 def slave_title(role: str) -> str:

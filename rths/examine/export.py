@@ -60,14 +60,14 @@ def run(args: argparse.Namespace) -> int:
                 tabular.write(path, happened, {"t": "s"})
     ticks, count = len(columns["seq"]), len(happened["t"])
     if args.json:
-        said: dict[str, Any] = {
+        written: dict[str, Any] = {
             "file": str(args.output),
             "ticks": ticks,
             "columns": list(columns),
             "units": units,
         }
-        said |= {"events": str(apart)} if apart else {}
-        sys.stdout.write(json.dumps(said) + "\n")
+        written |= {"events": str(apart)} if apart else {}
+        sys.stdout.write(json.dumps(written) + "\n")
     else:
         sys.stdout.write(f"{args.output}: {ticks} ticks, {len(columns)} columns, SI units\n")
         sys.stdout.write(f"{apart}: {count} events\n" if apart else "")

@@ -85,8 +85,8 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks) -> None:
     say(f"{args.output}: {found.t.size} ticks of {interval:g} s; signals: {', '.join(present)}\n")
     say(f"absent: {', '.join(absent) or 'none'}\n")
     if found.units:
-        said = (f"{name} in {unit}" for name, unit in found.units.items())
-        say(f"units, from the row below the names: {', '.join(said)}\n")
+        rows = (f"{name} in {unit}" for name, unit in found.units.items())
+        say(f"units, from the row below the names: {', '.join(rows)}\n")
     if found.interpolated:
         say(f"interpolated onto the ticks, and marked so: {', '.join(found.interpolated)}\n")
     if mapping.plan.roles and not judged:

@@ -185,5 +185,5 @@ def write_latency(summary: dict[str, Any]) -> None:
         sys.stdout.write(
             f"late ticks: {summary['late_ticks']}, missed altogether: {summary['missed_ticks']}\n"
         )
-    if said := said_beside_client(summary["beside_client"]):
-        sys.stdout.write(f"{said}\n")
+    if text := said_beside_client(summary["beside_client"]):
+        sys.stdout.write(f"{text}\n")

@@ -50,12 +50,12 @@ def run(args: argparse.Namespace) -> int:
     text = json.dumps(made, indent=2, ensure_ascii=False) + "\n"
     outputs.write_text(args.output, text, args.force)
     if args.json:
-        said = json.dumps(
+        line = json.dumps(
             {"file": str(args.output), "test": subject.test, "panels": list(made["configById"])}
         )
     else:
-        said = f"{args.output}: {len(made['configById'])} panels for recordings of the test '{subject.test}'"
-    outputs.aside(args.output).write(shown(said) + "\n")
+        line = f"{args.output}: {len(made['configById'])} panels for recordings of the test '{subject.test}'"
+    outputs.aside(args.output).write(shown(line) + "\n")
     return 0
 
 

@@ -138,8 +138,8 @@ def length(mapping: ImportMap, table: DataTable, data: Path) -> int:
     names = [*([mapping.time] if mapping.time else []), *(row.column for row in mapping.signals.values())]
     sizes = {name: pick(table, name, data).size for name in names if name}
     if len(set(sizes.values())) > 1:
-        said = ", ".join(f"'{name}' has {size}" for name, size in sizes.items())
-        raise InputError(f"{data}: the columns of the map have different numbers of rows: {said}.")
+        counts = ", ".join(f"'{name}' has {size}" for name, size in sizes.items())
+        raise InputError(f"{data}: the columns of the map have different numbers of rows: {counts}.")
     return next(iter(sizes.values()), 0)
 
 

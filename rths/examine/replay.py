@@ -162,7 +162,7 @@ class ComputedSignals:
             found |= {self._own.target.name: outputs.target, self._own.command.name: outputs.command}
             found |= {self._own.effort.name: outputs.effort} if self._own.effort else {}
         for group, names in self._groups:
-            rows = [told(outputs.sent[place], names) for place, _ in group]
+            rows = [commanded(outputs.sent[place], names) for place, _ in group]
             columns = rows[0] if len(rows) == 1 else map(list, zip(*rows, strict=True))
             found |= dict(zip(names, columns, strict=True))
         for name, values in outputs.of_storeys.items():
@@ -170,7 +170,7 @@ class ComputedSignals:
         return found
 
 
-def told(sent: tuple[float, ...], names: Sequence[str]) -> tuple[float, ...]:
+def commanded(sent: tuple[float, ...], names: Sequence[str]) -> tuple[float, ...]:
     """The values that a slave was sent, without the motor's force where its kind has none."""
     return sent if len(names) == len(sent) else (sent[0], *sent[2:])
 

@@ -18,7 +18,7 @@ from report.text.terminal import RunProgress
 if TYPE_CHECKING:
     from rths.perform.ending import Ending
     from rths.perform.live_child import View
-    from rths.perform.processes import Processes, Said
+    from rths.perform.processes import Processes, ProcessReport
 
 POLL_S = 0.1  # s between two looks at the processes: a user does not notice the delay
 AGREED = State.SCHEDULED.value  # state in which the master reports that all processes know the start
@@ -43,10 +43,10 @@ def follow(
     answered = 1
     doing: dict[str, str] = {}
     while not processes.all_ended():
-        said = processes.said(POLL_S)
-        if said is not None:
-            tell(said, progress)
-            note(said, ending, doing)
+        report = processes.next_report(POLL_S)
+        if report is not None:
+            tell(report, progress)
+            note(report, ending, doing)
         if isinstance(progress, ForwardedProgress):
             progress.alive([name for name in processes.names if name not in processes.ended()])
         if view is not None and (news := view.news()):
@@ -58,25 +58,25 @@ def follow(
             progress.say(answer(processes, doing))
 
 
-def note(said: Said, ending: Ending, doing: dict[str, str]) -> None:
+def note(report: ProcessReport, ending: Ending, doing: dict[str, str]) -> None:
     """Take note of a report that concerns the end of a test; `doing` says which laboratories arm or come to rest."""
-    match said.data:
-        case {"kind": "state", "state": state} if said.process == MASTER and state == AGREED:
+    match report.data:
+        case {"kind": "state", "state": state} if report.process == MASTER and state == AGREED:
             ending.agreed = True
         case {"kind": "state", "state": State.REGISTERED.value}:
-            doing[said.process] = f"arming its rig, at most {ending.arming:g} s"
-            ending.arms(said.process, time.monotonic())
+            doing[report.process] = f"arming its rig, at most {ending.arming:g} s"
+            ending.arms(report.process, time.monotonic())
         case {"kind": "state", "state": State.ARMED.value}:
-            doing.pop(said.process, None)
-            ending.armed(said.process, time.monotonic())
+            doing.pop(report.process, None)
+            ending.armed(report.process, time.monotonic())
         case {"kind": "mode", "mode": mode}:
-            doing.pop(said.process, None)
+            doing.pop(report.process, None)
             if mode == Mode.RAMPING.value:
-                doing[said.process] = "coming to rest"
-                ending.rests(said.process, time.monotonic())
+                doing[report.process] = "coming to rest"
+                ending.rests(report.process, time.monotonic())
         case {"kind": "resting", "left": float(left), "text": text}:
-            doing[said.process] = str(text)
-            ending.rests(said.process, time.monotonic(), left)
+            doing[report.process] = str(text)
+            ending.rests(report.process, time.monotonic(), left)
         case _:
             pass
 
@@ -98,19 +98,19 @@ def end_all(processes: Processes, ending: Ending) -> None:
     """End the processes in order if this program has failed, so that no rig is left in mid-motion."""
     doing: dict[str, str] = {}
     while not processes.all_ended():
-        if (said := processes.said(POLL_S)) is not None:
-            note(said, ending, doing)
+        if (report := processes.next_report(POLL_S)) is not None:
+            note(report, ending, doing)
         stop(processes, ending, "this program failed.", signal.SIGINT)
 
 
-def tell(said: Said, progress: RunProgress | ForwardedProgress) -> None:
+def tell(report: ProcessReport, progress: RunProgress | ForwardedProgress) -> None:
     """Show one report if it is meant for the user, or pass it on to a program."""
     if isinstance(progress, ForwardedProgress):
-        progress.forward(said.process, said.data)
+        progress.forward(report.process, report.data)
         return
-    match said.data:
-        case {"kind": "progress"} if said.process == MASTER:
-            progress.show(said.data)
+    match report.data:
+        case {"kind": "progress"} if report.process == MASTER:
+            progress.show(report.data)
         case {"kind": "mode", "lab": lab, "mode": mode}:
             progress.mode(lab, mode)
         case {"kind": "event", "code": "real_time", "missing": missing} if missing:
@@ -124,7 +124,7 @@ def tell(said: Said, progress: RunProgress | ForwardedProgress) -> None:
         case {"kind": "event", "code": code, "lab": lab, "text": text} if code not in UNSAID:
             progress.say(f"{lab}: {text}")
         case {"kind": "text", "text": text}:
-            progress.say(f"{said.process}: {text}")
+            progress.say(f"{report.process}: {text}")
         case _:
             pass
 

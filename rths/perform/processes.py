@@ -34,7 +34,7 @@ REPORTS = {  # reports of master, slaves and recorder by kind, and the keys that
 }
 
 
-class Said(NamedTuple):
+class ProcessReport(NamedTuple):
     """One report of one process, or a line that something else in it printed (kind 'text')."""
 
     process: str
@@ -116,7 +116,7 @@ class Processes:
 
     def __init__(self) -> None:
         self._running: dict[str, subprocess.Popen[str]] = {}
-        self._queue: Queue[Said] = Queue()  # not SimpleQueue, for the reason in common/link/inbox.py
+        self._queue: Queue[ProcessReport] = Queue()  # not SimpleQueue, for the reason in common/link/inbox.py
         self._threads: list[threading.Thread] = []
         self._home, self._lead = Leash(), Leash()  # held by this process, and by this one and the master
         self._read_until = 0.0
@@ -156,7 +156,7 @@ class Processes:
                 for data in understood(line):
                     if data["kind"] == "event" and data["level"] == "error":
                         self.errors.setdefault(name, data["code"])
-                    self._queue.put(Said(name, data))
+                    self._queue.put(ProcessReport(name, data))
 
     def _keep(self, name: str, process: subprocess.Popen[str]) -> None:
         assert process.stderr is not None  # noqa: S101 - it is a pipe
@@ -164,7 +164,7 @@ class Processes:
             for line in lines:
                 self._complaints[name].append(line)
 
-    def said(self, timeout: float) -> Said | None:
+    def next_report(self, timeout: float) -> ProcessReport | None:
         """The next report, waiting at most `timeout` s."""
         try:
             return self._queue.get(timeout=timeout)

@@ -121,10 +121,10 @@ def in_virtual_time(
     """Run the test in this process on the virtual clock; the error that ended it."""
     from simulation import virtual
 
-    said = before_the_start(plan, output, gate, paced=False)
+    lines = before_the_start(plan, output, gate, paced=False)
     with Working("running") as working:
         bench = virtual.assemble(plan, reality, output, partial(virtual_report, working), gate=gate)
-        sys.stderr.writelines(f"{line}\n" for line in said)
+        sys.stderr.writelines(f"{line}\n" for line in lines)
         error, seconds = played(bench, stopping, working)
     say_speed(bench, seconds)
     return error
@@ -155,8 +155,8 @@ def before_the_start(plan: Plan, output: Path, gate: Gate, *, paced: bool = True
     """
     made = checks(plan, output, paced=paced)
     gate.judge(made)
-    said = (f"risk '{one.risk.name}' is accepted" if one.risk else one.text for one in made)
-    return [f"pre-flight: {text}." for text in said]
+    lines = (f"risk '{one.risk.name}' is accepted" if one.risk else one.text for one in made)
+    return [f"pre-flight: {text}." for text in lines]
 
 
 def checks(plan: Plan, output: Path, *, paced: bool = True) -> list[PreflightCheck]:

@@ -73,10 +73,10 @@ def in_virtual_time(
     from master.client.pace import AsFastAsItGoes
     from simulation import virtual
 
-    said = tests.before_the_start(plan, output, gate)
+    lines = tests.before_the_start(plan, output, gate)
     warm_up_served(reality)
     building = ClientBuilding(plan, addresses, AsFastAsItGoes(PATIENCE_S, stopping), cli.text_report)
-    sys.stderr.writelines(f"{line}\n" for line in said)
+    sys.stderr.writelines(f"{line}\n" for line in lines)
     if not came(building, stopping):
         building.leave()
         return InterlockError(stopping())

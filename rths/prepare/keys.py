@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(json.dumps(plain(args.folder, roles, end)) + "\n")
     else:
-        sys.stdout.write(told(args.folder, roles, end))
+        sys.stdout.write(instructions(args.folder, roles, end))
     return 0
 
 
@@ -239,7 +239,7 @@ def plain(folder: Path, roles: Sequence[str], end: datetime) -> dict[str, Any]:
     }
 
 
-def told(folder: Path, roles: Sequence[str], end: datetime) -> str:
+def instructions(folder: Path, roles: Sequence[str], end: datetime) -> str:
     """Which files go where."""
     width = max(map(len, roles)) * 2 + 11
     rows = [f"  {f'{role}.pem, {role}.key':<{width}}  {PLACES[kind_of(role)]}" for role in roles]

@@ -22,7 +22,7 @@ from report.text.progress import Progress as Working
 from report.text.terminal import RunProgress, table
 from rths.__main__ import VERBS
 from rths.perform.follow import tell
-from rths.perform.processes import TEXT, Said
+from rths.perform.processes import TEXT, ProcessReport
 from tests.rths.diagnosis_report.pieces import bare
 
 READABLE = "µ²λ–Ωé"
@@ -64,7 +64,7 @@ def test_a_message_of_a_process_stays_on_one_line() -> None:
         {"kind": TEXT, "text": HOSTILE},  # of a rig
         {"kind": "mode", "lab": HOSTILE, "mode": HOSTILE},
     ):
-        tell(Said("slave", data), progress)
+        tell(ProcessReport("slave", data), progress)
     assert_harmless(stream.getvalue())
     assert stream.getvalue().count("\n") == 2
 

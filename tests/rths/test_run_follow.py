@@ -23,7 +23,7 @@ from laboratories.longest import resting
 from report.text.terminal import RunProgress
 from rths.perform.ending import KILL_S, LEAVE_S, MARGIN_S, SILENCE_S, WRITE_S, Ending, verdict
 from rths.perform.follow import answer, follow, note, tell
-from rths.perform.processes import Leash, Processes, Said, understood
+from rths.perform.processes import Leash, Processes, ProcessReport, understood
 
 NAMES = ("master", "slave", "recorder")
 EVENT = {"kind": "event", "lab": "slave", "level": "error", "code": "lost", "text": "gone"}
@@ -150,9 +150,9 @@ def test_a_stop_just_before_the_start_leaves_the_time_to_come_to_rest(short_plan
     )
 
 
-def said(process: str, state: State) -> Said:
+def said(process: str, state: State) -> ProcessReport:
     """The report of a laboratory that proceeds in the handshake."""
-    return Said(process, {"kind": "state", "lab": process, "state": state.value})
+    return ProcessReport(process, {"kind": "state", "lab": process, "state": state.value})
 
 
 def test_a_stop_while_a_rig_arms_leaves_it_the_time_that_the_others_would_wait(
@@ -220,8 +220,11 @@ def processes(tmp_path: Path, monkeypatch: Any) -> Any:
 
 def test_what_the_recorder_says_of_a_lost_test_is_no_cause_of_its_end(capsys: Any) -> None:
     event = EVENT | {"lab": "recorder", "text": "The laboratories fell silent; the recording ends there."}
-    tell(Said("recorder", event), RunProgress(1.0))
-    tell(Said("recorder", event | {"code": "recording_lost", "text": "No space is left."}), RunProgress(1.0))
+    tell(ProcessReport("recorder", event), RunProgress(1.0))
+    tell(
+        ProcessReport("recorder", event | {"code": "recording_lost", "text": "No space is left."}),
+        RunProgress(1.0),
+    )
     assert capsys.readouterr().err.splitlines() == [
         "recorder: The laboratories fell silent; the recording ends there.",
         "recorder: ends the test (recording_lost)",
@@ -263,7 +266,7 @@ def test_a_pipe_that_a_grandchild_holds_open_does_not_delay_the_end(
         "print(child.pid, flush=True)\n",
     )
     processes.start("slave", [])
-    said = processes.said(5.0)
+    said = processes.next_report(5.0)
     assert said is not None
     follow(processes, Ending(short_plan), RunProgress(1.0), Presses())
     os.kill(int(said.data["text"]), signal.SIGKILL)
@@ -286,7 +289,7 @@ def test_a_laboratory_that_hangs_on_its_ramp_is_killed_after_it_and_not_by_furth
     ending = Ending(short_plan)
     begun = time.monotonic()
     for _ in (RAMPING, LEFT):
-        heard = processes.said(30.0)
+        heard = processes.next_report(30.0)
         assert heard is not None
         note(heard, ending, {})
     follow(processes, ending, RunProgress(1.0), Presses(WISH, 2))
@@ -305,10 +308,10 @@ def test_the_answer_to_a_second_stop_states_what_a_laboratory_is_doing(
     processes.start("master", [])
     doing: dict[str, str] = {}
     assert "waiting for master" in answer(processes, doing)
-    note(Said("master", RAMPING), Ending(short_plan), doing)
-    note(Said("master", LEFT), Ending(short_plan), doing)
+    note(ProcessReport("master", RAMPING), Ending(short_plan), doing)
+    note(ProcessReport("master", LEFT), Ending(short_plan), doing)
     assert "master: unloading the column: 12.0 kN left" in answer(processes, doing)
-    note(Said("master", RAMPING | {"mode": "idle"}), Ending(short_plan), doing)
+    note(ProcessReport("master", RAMPING | {"mode": "idle"}), Ending(short_plan), doing)
     assert "waiting for master" in answer(processes, doing)
 
 

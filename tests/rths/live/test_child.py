@@ -85,7 +85,7 @@ class Test:
     def ended(self) -> dict[str, int]:
         return {}
 
-    def said(self, _timeout: float) -> None:
+    def next_report(self, _timeout: float) -> None:
         return None
 
     def ask(self, name: str, number: signal.Signals) -> None:
