@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 Facts = dict[
     str, Any
 ]  # the values of a recording by the names of COLUMNS; None where a recording does not say
+WHOLE, CUT, DAMAGED, UNREADABLE = "whole", "cut off", "damaged", "unreadable"  # states of a recording's file
 
 
 class CatalogueColumn(NamedTuple):

@@ -16,13 +16,12 @@ from common.recording.outcome import COMPLETED, CUT_OFF
 from common.recording.reader import read
 from common.recording.run import GROUND, PEAKS, Run
 from common.roles import MASTER, SLAVE, kind_of
-from report.catalogue.columns import DRIFT, NAMES, Facts, Peak, notes_of
+from report.catalogue.columns import CUT, DAMAGED, DRIFT, NAMES, UNREADABLE, WHOLE, Facts, Peak, notes_of
 from report.facts import circumstances, storeys
 from report.facts.laboratories import laboratories, whole_plan
 from report.facts.summary import peaks as of_messages
 from report.facts.summary import units_of
 
-WHOLE, CUT, DAMAGED, UNREADABLE = "whole", "cut off", "damaged", "unreadable"  # states of a recording's file
 STOPPED, TRIPPED, LOST = (
     "stopped",
     "tripped",

@@ -6,8 +6,7 @@ import sqlite3
 from collections.abc import Sequence
 
 from report.catalogue import store
-from report.catalogue.columns import BY_NAME, COLUMNS, Facts
-from report.catalogue.entry import WHOLE
+from report.catalogue.columns import BY_NAME, COLUMNS, WHOLE, Facts
 from report.text.formats import quantity
 from report.text.terminal import TitledTable
 
