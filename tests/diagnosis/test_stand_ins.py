@@ -10,7 +10,7 @@ from scipy import signal
 
 from diagnosis.diagnose import doubted
 from diagnosis.findings.certainty.trust import share_named
-from diagnosis.findings.verdict import PartVerdict, allowed, farthest, judge
+from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge
 from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.search import Search
@@ -56,6 +56,16 @@ def test_effects_that_leave_a_tenth_of_a_gap_are_as_probable_as_a_stand_in() -> 
     assert share_named(0.9) == pytest.approx(0.5)
     assert share_named(1.0) == pytest.approx(1.0)
     assert share_named(0.6) < share_named(0.95)
+
+
+def test_errors_of_readings_that_leave_a_tenth_of_a_gap_are_not_its_cause() -> None:
+    def search(left: float, name: str = "sensor.column_force.bias") -> Search:
+        chosen = Fit(DATA, {name: {"offset": 3.0}}, np.zeros(0), NOISY + left * GAP)
+        return Search(DATA, fit(NOISY + 10.0 * GAP), chosen, ())
+
+    assert artefact(search(5.0))
+    assert not artefact(search(1.0))
+    assert not artefact(search(5.0, "column.friction"))
 
 
 def wandering(whole: Record, *names: str) -> Record:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.verdict import REST
 from diagnosis.fits import worth
 from diagnosis.fits.unexplained import MATERIAL, remaining
 
@@ -36,9 +37,6 @@ class Weights(NamedTuple):
 # Of verdicts that leave something ("partly"), from 24 of them (docs/reference/blind.md). Of those that leave nothing no
 # sign told the wrong ones: there the probability follows from costs alone (`verdict.DOUBT`).
 PARTLY = Weights(-0.61, {"clear": 0.47, "names": -0.71})
-# A stand-in rarely explains more than nine tenths of a gap's energy, the true mechanism under another law rarely less:
-# on the set "tune" stand-ins explained 0.59 to 0.86 of it, true mechanisms 0.94 to 1.00.
-REST = 0.1
 
 
 def share_named(explained: float) -> float:
