@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.plan.kinds import COLUMN, TABLE
+from diagnosis.findings.verdict import pinned
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
@@ -69,7 +70,9 @@ def unexplained(data: Data, fit: Fit) -> SiteTrace:
     """Trace of what a fit leaves, at the site where it most likely arises."""
     residual = data.residual(hypothesis.lay(data, fit.z, fit.values)) / data.sigma
     left = [item.ratio for item in gaps(fit, data.group)]
-    site = culprit(data, residual, left)
+    far = pinned(fit)
+    # a parameter at its bound that leaves nothing to be seen took the gap upon itself
+    site = far[0].rpartition(".")[0] if far and max(left) < SEEN else culprit(data, residual, left)
     kept = residual[:, int(np.argmax(left))]
     return SiteTrace(
         site,

@@ -9,16 +9,18 @@ import pytest
 from scipy import signal
 
 from diagnosis.diagnose import doubted
+from diagnosis.findings import where
 from diagnosis.findings.certainty.trust import share_named
 from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge
 from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.search import Search
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import PartOfGap
 from models.registry import Array
 from report.gap import wording
-from tests.diagnosis.cases import Cases, lab_b, white
+from tests.diagnosis.cases import Cases, lab_a, lab_b, white
 from tests.diagnosis.test_equivalents import DATA, NOISY
 
 GAP = np.sin(0.2 * np.arange(DATA.groups))[:, None]
@@ -97,6 +99,16 @@ def test_loud_slow_noise_of_several_readings_is_noise(cases: Cases) -> None:
     whole = cases.record()
     found = judged(wandering(whole, *whole.labs[1].measured))
     assert (found.outcome, found.doubted) == ("tolerances", "")
+
+
+def test_a_gap_that_a_nominal_parameter_took_upon_itself_lies_at_its_machine(cases: Cases) -> None:
+    whole = cases.record()
+    data = residuals.prepare(lab_a(whole), whole)
+    noise = white(41, data.groups * data.sigma.size).reshape(data.groups, -1)
+    names = [item.name for item in data.part.nuisances]
+    for name, site in (("actuator.gain", "actuator"), ("column.stiffness", "column")):
+        pinned = Fit(data, {}, TOLERANCES * np.eye(len(names))[names.index(name)], noise)
+        assert where.unexplained(data, pinned).site == site
 
 
 def test_an_effect_that_is_hardly_the_cause_stands_in_for_it() -> None:
