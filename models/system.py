@@ -67,6 +67,11 @@ class ColumnEffects:
     friction_law: float = 0.0  # 2: a slider in the place of the planned specimen
     friction_stiffness: float = 1e7  # N/m, of that slider's joint
     viscous: float = 0.0  # N·s/m
+    viscous_law: float = (
+        0.0  # 1: a power of the rate, 2: behind a spring, in the place of the planned specimen
+    )
+    viscous_exponent: float = 1.0  # of the rate
+    viscous_stiffness: float = 1e7  # N/m, of that spring
     inertia: float = 0.0  # kg
     slip: float = 0.0  # m, whole gap
     slip_law: float = 0.0  # where the gap is: `laboratories.column.specimen.PLAYS`

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import minimize
@@ -12,14 +13,15 @@ from scipy.optimize import minimize
 from common.plan.kinds import COLUMN
 from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit, excess
-from diagnosis.fits.hypothesis import Problem
+from diagnosis.fits.hypothesis import Problem, Values
 from diagnosis.fits.screening import WORKERS
-from diagnosis.fits.unexplained import MATERIAL, remaining
+from diagnosis.fits.unexplained import remaining
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
 from laboratories.effects.effect import Effect, Law, Parameter
 from models.registry import Array
 from models.specimens import fit as specimens
+from models.specimens.fit import SpecimenFit
 
 # Where a column stands once it has yielded hangs on all before, so that a fit from afar ends nowhere: it starts from
 # what follows the measured force over the measured deformation best, or else starts are dense.
@@ -40,7 +42,14 @@ SLIGHT = (
 # Of a force's rms that the best fit leaves: what a model of force over deformation leaves by itself, from which on its
 # effects are fitted in the laboratory. That model knows no speed, which made up a quarter of the rest of a damper.
 NEARLY = 1.5
+# Of the force's rms: a second fault of an ordinary laboratory leaves less of a force than this, a specimen of another
+# kind than the planned one left 9 to 30 %.
+MUCH = 0.05
 LONG = 20  # steps of such a fit
+TOGETHER = 2  # of such fits, those that are fitted to their end
+STIFFNESS = "column.stiffness"  # what a law with the planned stiffness has beside it where that is wrong
+OTHERWISE = 1.25  # factor on the planned stiffness beyond which a law of yielding does not find its own way
+STIFFER = 10.0  # a spring that gives way by a tenth of the motion, between one that bends it and one that is not seen
 BETTER = 0.9  # of what is left beyond noise: less of it is worth another law than the first
 
 
@@ -106,9 +115,16 @@ def begun(fit: Fit) -> list[Fit]:
     """The fit with its last effect under further laws, where a fit of each starts best: those with the best starts."""
     way = path(fit.data.part)
     models = sorted({law.model for law in last(fit).laws[1:] if law.model}) if way is not None else []
-    followed = {model: specimens.fit(model, *way).parameters for model in models} if way is not None else {}
+    known = tuple(item.tobytes() for item in way) if way is not None else ()
+    followed = {model: following(model, *known).parameters for model in models}
     places = range(1, len(last(fit).laws))
     return sorted((begun_under(fit, place, followed) for place in places), key=cost)[:FITTED]
+
+
+@lru_cache(maxsize=32)
+def following(model: str, deformation: bytes, force: bytes) -> SpecimenFit:
+    """A model of a specimen fitted to a path of deformation (m) and force (N); a search asks for it more than once."""
+    return specimens.fit(model, np.frombuffer(deformation), np.frombuffer(force))
 
 
 def last(fit: Fit) -> Effect:
@@ -168,6 +184,7 @@ def starts(
     if law.model in followed:
         yield base | as_specimen(effect, law, strength, followed[law.model])
         return
+    base |= stiff(fit, effect, law)
     for share, shape in itertools.product(NEARER.tolist(), shapes(fit, effect, place)):
         yield base | shape | {strength.name: within(strength, share * base[strength.name])}
 
@@ -192,43 +209,69 @@ def as_specimen(
 
 
 def coupled(fit: Fit, best: Fit) -> list[Fit]:
-    """Fits with the effects that one model of a specimen holds together, such as a slider behind play.
+    """Fits with the effects that one model of a specimen holds together.
 
-    One by one such effects explain little, so that a search does not reach them: without its play a slider reverses too
-    early. They are tried where that model follows the measured force better than the best fit known.
+    They are a slider behind play, and a law of yielding whose first stiffness is not the planned one. One by one such
+    effects explain little, so that a search does not reach them: without its play a slider reverses too early. They are
+    tried where much of the force is left, and where the model follows the measured force about as well as the best fit
+    known, or better.
     """
     way = path(fit.data.part)
-    if way is None or remaining(best) < MATERIAL:
+    if way is None:
         return []
     residual = best.data.residual(hypothesis.lay(best.data, best.z, best.values))[:, -1]  # of the force
-    left = float(np.sqrt(np.mean(np.square(residual))))
-    result = []
-    for effect in fit.data.part.candidates:
-        for place, law in enumerate(effect.laws):
-            if law.beside and effect.name not in fit.names:
-                found = specimens.fit(law.model, *way)
-                if found.nrmse * float(np.sqrt(np.mean(np.square(way[1])))) < NEARLY * left:
-                    result += together(fit, effect, place, found.parameters)
-    return sorted(result, key=cost)
+    left = float(np.sqrt(np.mean(np.square(residual)) / np.mean(np.square(way[1]))))
+    if left < MUCH:
+        return []
+    places = [
+        (effect, place)
+        for effect in fit.data.part.candidates
+        for place, law in enumerate(effect.laws)
+        if law.model and effect.name not in fit.names
+    ]
+    models = sorted({effect.laws[place].model for effect, place in places})
+    found = {model: following(model, *(item.tobytes() for item in way)) for model in models}
+    starts = [
+        (found[effect.laws[place].model].nrmse, beside(fit, effect, place, found[effect.laws[place].model]))
+        for effect, place in places
+    ]
+    known = sorted((item for item in starts if item[1] and item[0] < NEARLY * left), key=lambda item: item[0])
+    begun = [fitting.at(fit.data, fit.values | values, np.zeros(fit.z.size)) for _, values in known[:FITTED]]
+    leading = sorted(begun, key=cost)[:TOGETHER]
+    return sorted((settled(fitted(item, LONG, ROUNDS)) for item in leading), key=cost)
 
 
-def together(fit: Fit, effect: Effect, place: int, found: Mapping[str, float]) -> list[Fit]:
-    """The fit with an effect under a law and the effects beside it, from the parameters of their common model."""
-    known, law = fit.data.catalogue, effect.laws[place]
+def beside(fit: Fit, effect: Effect, place: int, found: SpecimenFit) -> Values:
+    """An effect under a law and what its model holds beside it, from that model's parameters; empty for nothing."""
+    catalogue, law = fit.data.catalogue, effect.laws[place]
     (strength,) = (item for item in effect.parameters if not item.shape)
-    start = {name: dict(given) for name, given in fit.values.items()}
-    begun = effect.under(place, effect.values({strength.name: 0.0}))
-    start[effect.name] = begun | as_specimen(effect, law, strength, found)
+    base = effect.under(place, effect.values({strength.name: 0.0}))
+    result = {effect.name: base | as_specimen(effect, law, strength, found.parameters)}
     for name, renamed in law.beside.items():
-        other = known[name]
+        other = catalogue[name]
         index = next(
             i for i, item in enumerate(other.laws) if set(item.shapes) <= set(renamed) and item.shapes
         )
         bounds = {item.name: item for item in other.every}
-        given = {key: within(bounds[key], found[value]) for key, value in renamed.items()}
-        start[name] = {"law": float(index)} | given
-    nominal = fitting.at(fit.data, start, np.zeros(fit.z.size))
-    return [settled(fitted(nominal, LONG, ROUNDS))]
+        given = {key: within(bounds[key], found.parameters[value]) for key, value in renamed.items()}
+        result[name] = {"law": float(index)} | given
+    if law.beside:
+        return result
+    factor = found.parameters["stiffness"] / fit.data.system.plan.column.stiffness
+    if STIFFNESS not in catalogue or 1.0 / OTHERWISE < factor < OTHERWISE:
+        return {}
+    (parameter,) = catalogue[STIFFNESS].parameters
+    return {STIFFNESS: {parameter.name: within(parameter, factor)}} | result
+
+
+def stiff(fit: Fit, effect: Effect, law: Law) -> dict[str, float]:
+    """A stiffness that only this law has, at `STIFFER` times the largest force over the largest deformation."""
+    way = path(fit.data.part)
+    if way is None:
+        return {}
+    secant = float(np.max(np.abs(way[1])) / np.max(np.abs(way[0])))
+    names = [item for item in effect.further if item.name in law.shapes and item.unit == "N/m"]
+    return {item.name: within(item, STIFFER * secant) for item in names}
 
 
 def shapes(fit: Fit, effect: Effect, place: int) -> list[dict[str, float]]:

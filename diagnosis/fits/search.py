@@ -56,7 +56,7 @@ def search(data: Data, scales: Scales) -> Search:
     if remaining(chosen) < worth.LOUD:  # what leaves more has not found its largest effects yet
         chosen = together(chosen, scales)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
-    return physical(Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others))))
+    return plainest(Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others))))
 
 
 def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, list[Fit]]:
@@ -138,20 +138,23 @@ def trimmed(fit: Fit) -> Fit:
     return replace(fit, values=values) if values != fit.values else fit
 
 
-def physical(search: Search) -> Search:
-    """The search with a machine's effect in front where the data cannot tell it from a sensor's."""
-    catalogue = search.data.catalogue
-    measured = sum(catalogue[name].kind == "measurement" for name in search.chosen.names)
-    for other in search.alternatives:
-        artefacts = sum(catalogue[name].kind == "measurement" for name in other.names)
-        if (
-            artefacts < measured
-            and len(other.names) == len(search.chosen.names)
-            and tied(search.chosen, other)
-        ):
-            rest = [search.chosen, *(item for item in search.alternatives if item is not other)]
-            return replace(search, chosen=other, alternatives=tuple(rest))
-    return search
+def plainest(search: Search) -> Search:
+    """The search with that one in front of as many effects that the data cannot tell from the chosen ones.
+
+    A machine's effect stands before a sensor's, and then the one with the fewest free parameters.
+    """
+    catalogue, chosen = search.data.catalogue, search.chosen
+
+    def order(fit: Fit) -> tuple[int, int]:
+        artefacts = sum(catalogue[name].kind == "measurement" for name in fit.names)
+        return artefacts, trade.freedom(fit)[0]
+
+    same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
+    stands = min([chosen, *(item for item in same if tied(chosen, item))], key=order)
+    if stands is chosen:
+        return search
+    rest = [chosen, *(item for item in search.alternatives if item is not stands)]
+    return replace(search, chosen=stands, alternatives=tuple(rest))
 
 
 def exchanged_pair(chosen: Fit, other: Fit) -> tuple[str, str] | None:

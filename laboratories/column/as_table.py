@@ -33,8 +33,9 @@ OF_CENTRING = ("centring", "centring_hardening", "centring_loop")
 
 def as_table(column: Column, effects: ColumnEffects) -> tuple[Column, ColumnEffects]:
     """The table of a column with the effects that its keys can say, and the effects that are left."""
-    column = replace(column, damping=column.damping + effects.viscous, mass=column.mass + effects.inertia)
-    left = replace(effects, viscous=0.0, inertia=0.0)
+    linear = 0.0 if effects.viscous_law else effects.viscous  # a table has no other dashpot
+    column = replace(column, damping=column.damping + linear, mass=column.mass + effects.inertia)
+    left = replace(effects, viscous=effects.viscous - linear, inertia=0.0)
     yields, centres = np.isfinite(left.yield_displacement), np.isfinite(left.centring)
     if column.model != LINEAR or yields == centres:  # a column follows one law alone
         return column, left

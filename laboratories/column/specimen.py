@@ -2,8 +2,8 @@
 
     f = g(δ_max)·p(δ')·(f_column(δ') + e(δ')) + friction + c·δ̇ + m·δ̈,    δ' = δ outside the grip's gap
 
-`f_column` is the plan's model or, with the effects of yielding, centring or a slider, another of `models.specimens` in
-its place; e is the effect of hardening; m and c include the plan's mass and dashpot. A law learned from a recording
+`f_column` is the plan's model or, with the effects of yielding, centring, a slider or a dashpot, another model in its
+place; e is the effect of hardening; m and c include the plan's mass and dashpot. A law learned from a recording
 adds to the force. Without any of these the force equals exactly that of the plan's model.
 """
 
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.plan.laboratory_tables import Column
-from models import friction, preisach, specimens
+from models import dashpot, friction, preisach, specimens
 from models.compiled import jit, jit_apart
 from models.registry import Array
 from models.specimens import SPECIMENS, self_centring, slider
@@ -26,9 +26,11 @@ PRESENT, STIFFNESS, YIELDS, DEGRADATION, PINCHING, PINCHING_WIDTH, PINCHING_HARD
 FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP, FRICTION_VELOCITY = range(7, 13)
 ASYMMETRY, DROP, SPEED, PLAY, BESIDE, CENTRES, STIFFENING, BEND = range(13, 21)
 SECOND_STIFFENING, SECOND_BEND, PINCHING_TAILS, SLIDES, CORNER = range(21, 26)
+POWER, DASHPOT, EXPONENT, SPRING = range(26, 30)
 
-# places in `cell`; the last two are the specimen's place within play, and the force that it carried there
-DEFORMATION, RATE, LARGEST, SLIDER, LAST_STEP, REACTION, INSIDE, CARRIED = range(8)
+# places in `cell`; the last three are the specimen's place within play, the force that it carried there, and the force
+# of a dashpot behind a spring
+DEFORMATION, RATE, LARGEST, SLIDER, LAST_STEP, REACTION, INSIDE, CARRIED, DAMPED = range(9)
 LAWS = (
     "bouc_wen",
     "bilinear",
@@ -44,6 +46,7 @@ LAWS = (
 )  # of yielding, in the order of `ColumnEffects.law`
 PLAYS = ORIGIN, RESTING, HELD, PARTLY, ROUNDED = range(5)  # where the gap is: see `column.slip`
 IN_PLACE = 2  # of `ColumnEffects.friction_law`: a slider in the place of the planned specimen
+BY_POWER, DASHPOT_IN_PLACE = 1, 2  # of `ColumnEffects.viscous_law`
 TWICE = 2  # of `ColumnEffects.stiffening_law`: with two bends
 STIFFENED_AT = 2e-3  # m, reference deformation of hardening with the square of the deformation
 DEGRADED_AT = (
@@ -72,11 +75,13 @@ class Specimen(NamedTuple):
 def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
     """Specimen at rest, with the plan's mass and dashpot beside those of the effects."""
     more = effects or ColumnEffects()
-    more = replace(more, viscous=more.viscous + column.damping, inertia=more.inertia + column.mass)
+    power = more.viscous if more.viscous_law else 0.0
+    more = replace(more, viscous=more.viscous - power + column.damping, inertia=more.inertia + column.mass)
     code, params, memory = specimens.pack(column.model, stiffness=column.stiffness, **column.parameters)
     yields, centres = np.isfinite(more.yield_displacement), np.isfinite(more.centring)
     bend = more.stiffening_bend if more.stiffening_law else 0.0
-    slides = bool(more.friction_law == IN_PLACE and more.friction)
+    vacant = not (yields or centres)  # one law takes the place of the planned specimen
+    slides = bool(vacant and more.friction_law == IN_PLACE and more.friction)
     values = [
         float(more != ColumnEffects()),
         column.stiffness,
@@ -85,7 +90,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         more.pinching,
         more.pinching_width,
         more.pinching_hardening,
-        0.0 if slides else more.friction,
+        0.0 if more.friction_law == IN_PLACE else more.friction,
         more.presliding,
         more.viscous,
         more.inertia,
@@ -104,6 +109,10 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         more.pinching_tails if more.pinching_law else 0.0,
         float(slides),
         corner(more),
+        power if more.viscous_law == BY_POWER else 0.0,
+        power if vacant and more.viscous_law == DASHPOT_IN_PLACE else 0.0,
+        more.viscous_exponent,
+        more.viscous_stiffness,
     ]
     law = np.array(more.learned)
     return Specimen(
@@ -117,7 +126,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         np.zeros(self_centring.STATE_SIZE),
         sliding(more),
         np.zeros(slider.STATE_SIZE),
-        np.zeros(8),
+        np.zeros(9),
         law,
         preisach.memory(law),
     )
@@ -212,15 +221,19 @@ def behind_play(effects: Array, cell: Array, deformation: float) -> float:
 
 
 @jit
-def carried(specimen: Specimen, within: float, rate: float) -> float:
+def carried(specimen: Specimen, within: float, rate: float, step: float) -> float:
     """Force (N) of the column at its own deformation (m): of the plan's model, or of the laws in its place.
 
-    `rate` (m/s) of the deformation is what the friction of a slider depends on.
+    The friction of a slider and the force of a dashpot depend on the `rate` (m/s) within a `step` (s).
     """
     effects = specimen.effects
     if effects[SLIDES] != 0.0:
         level = friction.left(rate, 0.0, effects[DROP], effects[SPEED])
         result, elastic = slider.moved(specimen.sliding, specimen.slid, within, level), 0.0
+    elif effects[DASHPOT] != 0.0:
+        held = specimen.cell[DAMPED] + effects[SPRING] * rate * step
+        result = dashpot.relaxed(held, effects[SPRING] * step, effects[DASHPOT], effects[EXPONENT])
+        specimen.cell[DAMPED], elastic = result, 0.0
     else:
         result = specimens.step(specimen.code, specimen.params, specimen.memory, within)
         elastic = effects[STIFFNESS] * within
@@ -254,7 +267,7 @@ def with_effects(specimen: Specimen, deformation: float, step: float) -> float:
     within = behind_play(effects, cell, deformation)
     moved = deformation - cell[DEFORMATION]
     rate = moved / step
-    result = carried(specimen, within, rate)
+    result = carried(specimen, within, rate, step)
     if effects[PLAY] == RESTING and effects[SLIP] > 0.0:
         if result * loaded < 0.0 or (loaded == 0.0 and within == rested):  # between both contacts
             result = 0.0
@@ -277,6 +290,8 @@ def with_effects(specimen: Specimen, deformation: float, step: float) -> float:
         result += preisach.step(specimen.learned, specimen.learned_memory, deformation, rate)
     cell[REACTION] = result
     result += effects[VISCOUS] * rate
+    if effects[POWER] != 0.0:
+        result += dashpot.force(rate, effects[POWER], effects[EXPONENT])
     if effects[INERTIA] != 0.0 and cell[LAST_STEP] > 0.0:
         result += effects[INERTIA] * (rate - cell[RATE]) / (0.5 * (step + cell[LAST_STEP]))
     cell[DEFORMATION] = deformation

@@ -318,9 +318,61 @@ def test_a_friction_damper_with_play_is_friction_and_slip_whatever_stiffness_is_
     part = FrictionDamper()
     data = Data(part, System(Plan()), level, level, group, train, np.zeros(1))
     bare = fitting.fit(data, {})
-    (found,) = laws.coupled(bare, bare)
+    found, *_ = laws.coupled(bare, bare)
     friction, slip = found.values["column.friction"], found.values["column.slip"]
     assert friction["force"] == pytest.approx(0.5 * (part.PUSH + part.PULL), rel=0.02)
     assert friction["asymmetry"] == pytest.approx(-0.2, abs=0.01)
     assert slip["gap"] == pytest.approx(part.PLAY, rel=0.05)
     assert found.chi < 1.2 * found.reduced.size
+
+
+class FluidDamper(FrictionDamper):
+    """A column alone that is a fluid damper on brackets: Maxwell's element, integrated in fine steps."""
+
+    COEFFICIENT, EXPONENT, SPRING = 300e3, 0.5, 30e6  # N·s/m at 0.1 m/s
+
+    def __init__(self) -> None:
+        super().__init__()
+        fine, f = 50, 0.0
+        force = np.empty(TICKS)
+        for tick, moved in enumerate(np.diff(self.inputs, prepend=0.0)):
+            for _ in range(fine):
+                given = 0.1 * (abs(f) / (0.1 * self.COEFFICIENT)) ** (1.0 / self.EXPONENT)
+                f += self.SPRING * (moved - np.copysign(given, f) * INTERVAL) / fine
+            force[tick] = f
+        self.measured = (force + NOISE * np.random.default_rng(4).standard_normal(TICKS))[:, None]
+
+
+def test_a_fluid_damper_is_viscous_with_its_exponent_whatever_stiffness_is_planned() -> None:
+    group, train = residuals.withheld(TICKS, INTERVAL)
+    level = np.array([NOISE])
+    part = FluidDamper()
+    data = Data(part, System(Plan()), level, level, group, train, np.zeros(1))
+    first = fitting.fit(data, {"column.viscous": {"coefficient": 200e3}})
+    (found,) = laws.in_best_laws([first])
+    values = found.values["column.viscous"]
+    assert values["law"] == 2
+    assert values["exponent"] == pytest.approx(part.EXPONENT, rel=0.03)
+    assert values["coefficient"] == pytest.approx(part.COEFFICIENT, rel=0.05)
+    assert values["stiffness"] == pytest.approx(part.SPRING, rel=0.1)
+    assert found.chi < 1.2 * found.reduced.size
+
+
+class SoftlyPlanned(Driven):
+    """The column that yields by the pinched law, planned four times as soft as it is."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.candidates = (CATALOGUE["column.yielding"], CATALOGUE["column.stiffness"])
+
+
+def test_a_column_that_yields_is_found_where_the_planned_stiffness_means_nothing() -> None:
+    group, train = residuals.withheld(TICKS, INTERVAL)
+    level = np.array([NOISE])
+    system = System(Plan()).scaled("column", "stiffness", 0.25)
+    data = Data(SoftlyPlanned(), system, level, level, group, train, np.zeros(1))
+    bare = fitting.fit(data, {})
+    found, *_ = laws.coupled(bare, bare)
+    assert set(found.values) == {"column.stiffness", "column.yielding"}
+    assert found.values["column.stiffness"]["factor"] == pytest.approx(4.0, rel=0.03)
+    assert found.values["column.yielding"]["yield_displacement"] == pytest.approx(LIMIT, rel=0.05)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -358,3 +359,33 @@ def test_the_work_of_falling_friction_by_quadrature_agrees_with_the_loop() -> No
 
     expected = 4.0 * quad(power, 0.0, 0.25 / frequency)[0]
     assert last_loop(path, specimen_under(path, more), frequency) == pytest.approx(expected, rel=3e-3)
+
+
+def test_a_viscous_column_may_depend_on_a_power_of_the_rate() -> None:
+    _, path = cycles(2e-3, 1.0)
+    speed = np.diff(path, prepend=path[0]) / SHORT
+    more = ColumnEffects(viscous=4e4, viscous_law=1.0, viscous_exponent=0.4)
+    expected = K * path + 4e4 * 0.1 * np.sign(speed) * (np.abs(speed) / 0.1) ** 0.4
+    assert np.allclose(specimen_under(path, more), expected, rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize("exponent", [0.3, 1.0, 1.6])
+def test_a_dashpot_behind_a_spring_solves_maxwells_equation(exponent: float) -> None:
+    _, path = cycles(2e-3, 1.0, 1)
+    more = ColumnEffects(viscous=4e5, viscous_law=2.0, viscous_exponent=exponent, viscous_stiffness=2e7)
+
+    def rate(t: float, f: Array) -> Array:
+        size = 0.1 * (np.abs(f) / (4e5 * 0.1)) ** (1.0 / exponent)
+        return np.asarray(2e7 * (2e-3 * 2.0 * np.pi * np.cos(2.0 * np.pi * t) - np.sign(f) * size))
+
+    times = np.arange(path.size) * SHORT
+    exact = solve_ivp(rate, (0.0, times[-1]), [0.0], t_eval=times, method="LSODA", rtol=1e-8, atol=1e-2).y[0]
+    got = specimen_under(path, more)
+    assert np.max(np.abs(got - exact)) < 0.02 * np.max(np.abs(exact))
+
+
+def test_one_law_alone_takes_the_place_of_the_planned_specimen() -> None:
+    path = through(3e-3, -3e-3)
+    yields = ColumnEffects(yield_displacement=1e-3, law=1.0)
+    both = replace(yields, friction=5e3, friction_law=2.0, viscous=1e5, viscous_law=2.0)
+    assert np.array_equal(specimen_under(path, both), specimen_under(path, yields))

@@ -5,7 +5,8 @@
 It acts as a spring that slides at `force`; before it slides, the contact deforms by `presliding` to either side. With
 `law` 1 the force is larger by the share `asymmetry` in the positive direction and smaller by it in the negative one,
 and decreases by the share `drop` at high speed. With `law` 2 the specimen itself is a slider, as in a friction damper:
-it takes the place of the planned specimen, behind a joint of `stiffness`, whose play is `column.slip`
+it takes the place of the planned specimen, unless `column.yielding` or
+`column.self_centring` does, behind a joint of `stiffness`, whose play is `column.slip`
 (`models/specimens/slider.py`).
 
 Not to be confused with `column.viscous`, whose loop grows with speed, or `column.yielding`, which has no loop at small

@@ -16,6 +16,6 @@ EFFECT = factor_on(
     of_plan("column", "stiffness"),
     says="the specimen is stiffer or softer",
     reference="f = factor·k·δ",
-    bounds=(0.1, 5.0),
+    bounds=(0.001, 100.0),
     sizes=(0.7, 0.85, 0.94, 1.06, 1.15, 1.3),
 )

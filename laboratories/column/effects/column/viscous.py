@@ -2,14 +2,18 @@
 
     f = f_column + coefficient·δ̇
 
+With `law` 1 it is a power of the rate, coefficient·v₀·|δ̇/v₀|^exponent with v₀ = 0.1 m/s. With `law` 2 the specimen
+itself is such a dashpot behind a spring of `stiffness`, as a fluid damper with its brackets: it takes the place of the
+planned specimen, unless another effect does (`models/dashpot.py`).
+
 Not to be confused with a lag of the load cell or of the displacement reading, which gives a linear specimen the same
 loop; nor with `column.friction`, whose force does not grow with speed.
 """
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Parameter
-from laboratories.effects.laws import sets
+from laboratories.effects.effect import Law, Parameter
+from laboratories.effects.laws import sets, which_law
 
 EFFECT = sets(
     "column",
@@ -20,10 +24,40 @@ EFFECT = sets(
             "N·s/m",
             null=0.0,
             least=0.0,
-            most=2000000.0,
+            most=1e9,
             sizes=(3000.0, 10000.0, 40000.0, 150000.0),
         ),
     },
+    further={
+        "viscous_law": which_law(
+            2.0, "0 with the rate, 1 with a power of it, 2 that behind a spring, in the specimen's place"
+        ),
+        "viscous_exponent": Parameter(
+            "exponent",
+            "",
+            null=1.0,
+            least=0.1,
+            most=2.5,
+            sizes=(),
+            says="power of the rate of laws 1 and 2",
+            shape=True,
+        ),
+        "viscous_stiffness": Parameter(
+            "stiffness",
+            "N/m",
+            null=1e7,
+            least=1.0,
+            most=1e13,
+            sizes=(),
+            says="stiffness of the spring of law 2",
+            shape=True,
+        ),
+    },
+    laws=(
+        Law("with the rate", {}),
+        Law("with a power of the rate", {"exponent": 0.6}),
+        Law("a dashpot behind a spring in the specimen's place", {"exponent": 0.6, "stiffness": 1e7}),
+    ),
     says="force that grows with the rate of deformation",
     reference="f = f_column + coefficient·δ̇",
 )
