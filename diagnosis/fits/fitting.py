@@ -49,6 +49,17 @@ class Fit:
         problem = Problem(self.data, self.values)
         return problem.jacobian(problem.place(self.values, self.z), self.reduced.ravel())
 
+    @cached_property
+    def central(self) -> Array:
+        """The derivative by differences to both sides.
+
+        What those to one side err by makes parameters look apart that no data can tell apart, as a stiffness and the
+        effect on it.
+        """
+        problem = Problem(self.data, self.values)
+        place = problem.place(self.values, self.z)
+        return 0.5 * (self.jacobian + problem.jacobian(place, self.reduced.ravel(), side=-1.0))
+
     @property
     def seen_slopes(self) -> Array:
         """The slopes of the residuals that the fit has seen, (groups·signals of these, parameters)."""

@@ -153,14 +153,16 @@ class Problem:
         low, high = np.array(ranges, dtype=np.float64).reshape(-1, 2).T
         return low, high
 
-    def jacobian(self, p: Array, here: Array | None = None, first: int = 0, last: int | None = None) -> Array:
-        """Differences of the residuals over some of the parameters, (groups·signals, parameters)."""
+    def jacobian(
+        self, p: Array, here: Array | None = None, first: int = 0, last: int | None = None, side: float = 1.0
+    ) -> Array:
+        """Differences of the residuals over some of the parameters, (groups·signals, parameters), to a side: 1, -1."""
         here = self.reduced(p).ravel() if here is None else here
         columns = []
-        _, high = self.bounds()
+        low, high = self.bounds()
         for place in range(first, p.size if last is None else last):
-            step = self._step * self._share(place, float(p[place]))
-            if p[place] + step > high[place]:
+            step = side * self._step * self._share(place, float(p[place]))
+            if not low[place] <= p[place] + step <= high[place]:
                 step = -step
             moved = p.copy()
             moved[place] += step

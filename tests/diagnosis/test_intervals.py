@@ -28,7 +28,7 @@ def fit_of_mean(series: Array) -> Fit:
         system=SimpleNamespace(plan=plan),
     )
     found = Fit(data, {}, np.zeros(0), (series - series.mean())[:, None])
-    found.__dict__["jacobian"] = np.full((series.size, 1), -1.0)
+    found.__dict__["central"] = np.full((series.size, 1), -1.0)
     return found
 
 

@@ -75,7 +75,7 @@ def spread(fit: Fit) -> Spread:
     the share that the other blocks know of a direction, because a fit makes what it has seen too small (the jackknife
     estimator CR3: R. M. Bell and D. F. McCaffrey, Survey Methodology 28 (2002)).
     """
-    pieces, prior = list(by_block(fit)), np.zeros(fit.jacobian.shape[1])
+    pieces, prior = list(by_block(fit)), np.zeros(fit.central.shape[1])
     prior[: fit.z.size] = 1.0
     white = np.sum([slopes.T @ slopes for slopes, _ in pieces], axis=0)
     information = white + np.diag(prior)
@@ -98,7 +98,7 @@ def by_block(fit: Fit) -> Iterator[tuple[Array, Array]]:
     """Slopes (rows, parameters) and residuals (rows,) that a fit has seen, block by block, as it weighted signals."""
     groups, signals = fit.reduced.shape
     weights = fitting.weights(fit)
-    slopes = fit.jacobian.reshape(groups, signals, -1) * weights[:, None]
+    slopes = fit.central.reshape(groups, signals, -1) * weights[:, None]
     residuals = fit.reduced * weights
     block = max(1, round(BLOCK / (fit.data.system.plan.test.interval * fit.data.group)))
     for begin in range(0, groups, block):
