@@ -14,7 +14,7 @@ from diagnosis.fits.unexplained import leaves, remaining
 
 MOST = 3  # effects of one part: more of them can imitate any residual
 # Effects of one part that leave only noise, each of them needed for that; the share of what is left that each must
-# explain on the way. Of 12 gaps of unknown effects and other formulas none was taken for such a set (set "tune").
+# explain on the way. Of 11 gaps of unknown effects and other formulas none was taken for such a set.
 TOGETHER, STEP_OF_LEFT = 6, 0.3
 HALVINGS = 20  # by which a value is found beyond which the system is the same
 
