@@ -72,6 +72,7 @@ UNRUN = {
         "rths blind --set tune --seed 6002 --cases 40 --duration 20",
         "rths blind --set normal --seed 6003 --only clean,catalogue --cases 40 --duration 12",
         "rths blind --set judge --seed 6101 --cases 60 --duration 20",
+        "rths blind --set judge --seed 8101 --only unknown,formula,catalogue --cases 24 --duration 16",
         "rths blind --cases 240 --set judge --seed 2026 --jobs 2 -o runs/blind",
         "rths blind --cases 40 --set judge --seed 2026 --duration 20",
     ],
