@@ -13,7 +13,7 @@ from common.errors import InputError
 from common.plan.kinds import COLUMN
 from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import readings, report
+from diagnosis.findings import logger, readings, report
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
 from diagnosis.fits import residuals
@@ -26,7 +26,12 @@ from diagnosis.recorded.divided import driven, parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.joined import joined, refuse_others
 from diagnosis.recorded.link import LinkFinding
-from diagnosis.recorded.parts import Building, LaboratoryPart, LoggedBuilding, Part
+from diagnosis.recorded.parts import (
+    Building,
+    LaboratoryPart,
+    LoggedBuilding,
+    Part,
+)
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from models.system import System
 
@@ -97,10 +102,10 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         )
     further = [part for other in more for part in parts_of(other)]
     rounded = readings.steps(record)
-    steps = readings.resolutions(record, rounded)
+    steps = readings.resolutions(record, rounded) | logger.interpolated(parts)
     datas, verdicts = [], []
-    # s, delay that a logger added to the forces from which the building was computed.
-    late: float | None = None
+    # s, delay that a logger added to all channels, and to the forces of a building; None without a logger.
+    late = None if record.stated is None else logger.common_delay(parts, record, steps)
     for number, given in enumerate(parts, 1):
         part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
         tell(part.name, number, len(parts))
@@ -115,7 +120,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     searches = [item.search for item in verdicts]
     final, held = [item.data for item in searches], readings.held(record, rounded)
     sharp = readings.levels(final, list(map(sharpest, searches)))
-    return Diagnosis(
+    result = Diagnosis(
         record,
         verdicts,
         readings.findings(record, sharp, rounded, logged=late is not None),
@@ -132,6 +137,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         ],
         [law for verdict in verdicts if verdict.outcome in UNNAMED for law in learn(verdict.search.chosen)],
     )
+    return replace(result, warnings=[*result.warnings, *logger.remarks(result)])
 
 
 def other_view(part: Part, record: Record, steps: Mapping[str, float]) -> Data | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from common.plan.plan import Plan
 from diagnosis.findings.readings import SensorFinding
@@ -11,6 +12,7 @@ from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.hypothesis import Values
 from diagnosis.learned.learn import LearnedLaw, Of
 from diagnosis.recorded.link import LinkFinding
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
 from models.system import System
 
@@ -62,6 +64,22 @@ class Diagnosis:
             if (sites is None or effect.site in sites) and (noisy or not effect.random):
                 systems[role] = effect.apply(systems[role], **{reading.parameter: reading.value})
         return systems
+
+    @cached_property
+    def logger(self) -> dict[str, tuple[float, float]]:
+        """Delay (s) and gain that the data logger gave to each reading, by signal; empty where rths recorded."""
+        result: dict[str, tuple[float, float]] = {}
+        for verdict in self.verdicts:
+            part, z = verdict.search.data.part, verdict.search.chosen.z
+            if not isinstance(part, LaboratoryPart):
+                continue
+            system = System(self.record.plans[part.role])
+            for nuisance, place in zip(part.nuisances, z, strict=True):
+                system = nuisance.moved(system, float(place)) if nuisance.of_record else system
+            for name in part.lab.kind.channels.names:
+                if made := system.effects.sensors.get(name):
+                    result[part.lab.signal(name)] = made.delay, made.gain
+        return result
 
     def corrected(self, plans: Mapping[str, Plan] | None = None, of: Of = "law") -> dict[str, System]:
         """Systems of master and slave by role, with the effects of all sites and the learned laws."""

@@ -51,10 +51,21 @@ class RecordingGaps:
         return self.simulated(self.found.systems(sites, self.record.plans), linked=linked)
 
     def simulated(self, systems: Mapping[str, System], *, linked: bool = True) -> Mapping[str, Array] | None:
-        """Simulated response of systems, with the exchange that was found where `linked`."""
+        """Simulated response of systems behind the logger, with the exchange that was found where `linked`."""
         if self.loop is not None:
-            return self.loop.simulate(systems, linked=linked and bool(self.found.link))
-        return self.open(systems)
+            return self.logged(self.loop.simulate(systems, linked=linked and bool(self.found.link)))
+        return self.logged(self.open(systems))
+
+    def logged(self, simulated: Mapping[str, Array] | None) -> Mapping[str, Array] | None:
+        """Simulated readings as the logger that was found has them: late, and with its gain."""
+        if simulated is None or self.record.stated is None:
+            return simulated
+        ticks = np.arange(self.record.ticks) * self.record.plan.test.interval
+        result = dict(simulated)
+        for name, (delay, gain) in self.found.logger.items():
+            if name in result:
+                result[name] = gain * np.interp(ticks - delay, ticks, result[name])
+        return result
 
     def open(self, systems: Mapping[str, System]) -> Mapping[str, Array]:
         """Each part's own prediction, where no loop was recorded."""

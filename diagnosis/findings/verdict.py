@@ -13,10 +13,9 @@ from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, exchanged_pair
 from diagnosis.fits.trade import tied
-from diagnosis.fits.unexplained import MATERIAL, gaps, leaves
+from diagnosis.fits.unexplained import MATERIAL, gaps, leaves, model_error
 from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN
 from diagnosis.recorded.nuisances import LoggedReadings
-from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.report.records import Outcome
 from models.registry import Array
 
@@ -28,7 +27,6 @@ HALF = 0.5
 # that the true cause is not among the effects named, by outcome.
 TEMPERATURE = 3.0
 DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}
-BOTH = 2.0  # solutions with an error of their own: the laboratory's and the replay's
 MOST_LEFT = 0.2  # of a gap's rms that effects may leave as an error of such solutions: 4 % of its energy
 # Share of a gap's rms that may be taken for coloured noise where only the residual itself is evidence: a sixth of its
 # energy.
@@ -198,12 +196,8 @@ def allowed(search: Search) -> Array:
 
     That is no more than a small share of the gap, as otherwise an effect that explains half of a small gap would do.
     """
-    data = search.data
-    if data.part.exact:
-        return np.zeros(data.sigma.size)
-    level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
-    whole = np.array([item.ratio for item in gaps(search.commissioned, data.group)])
-    return np.minimum(BOTH * MODEL_ERROR * level / data.sigma, MOST_LEFT * whole)
+    whole = np.array([item.ratio for item in gaps(search.commissioned, search.data.group)])
+    return np.minimum(model_error(search.chosen), MOST_LEFT * whole)
 
 
 def heard(search: Search) -> Array:

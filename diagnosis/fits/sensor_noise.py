@@ -149,6 +149,11 @@ def coloured(data: Data) -> bool:
     return any(item.density is not None for item in data.noise)
 
 
+def altered(data: Data) -> bool:
+    """Whether readings hold more than white noise: noise of a colour, lines or spikes."""
+    return coloured(data) or data.lines is not None or data.spikes is not None
+
+
 def whitened(fit: Fit) -> Data:
     """The data of a fit with white noise of the level of the highest frequencies, lines and spikes taken away."""
     data = replace(fit.data, noise=())
@@ -203,7 +208,7 @@ def foreseen(fit: Fit) -> list[Foreseen]:
 def inputs(part: Part, system: System) -> Array:
     """What a part's residuals may depend on, (ticks, inputs): its commands and its readings as predicted.
 
-    Where the targets were recorded, they stand in for the commands: these hold noise that a controller fed back. A
+    Targets stand in for the commands of transfer systems: these hold noise that a controller fed back. A
     building's own motion stands in for what is predicted from the noise of the forces.
     """
     columns = dependencies(part, system)
@@ -217,8 +222,8 @@ def dependencies(part: Part, system: System) -> Array:
     if isinstance(part, LoggedBuilding):
         return np.column_stack([part.ground, part.motion])
     if isinstance(part, LaboratoryPart):
-        part = part.replaced(inputs=part.wanted)
         columns = list(part.wanted.values())
+        part = part.replaced(inputs=part.inputs | part.wanted)
     else:
         columns = [part.inputs] if isinstance(part, ColumnAlone) else []
     return np.column_stack([*columns, *np.nan_to_num(part.predict(system)).T])

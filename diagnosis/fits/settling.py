@@ -16,10 +16,11 @@ from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import screen
 from diagnosis.fits.sensor_noise import quieter
-from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, leaves
+from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, leaves, model_error
 
 ROUNDS = 4  # in which a fit and the noise that it leaves are found in turn
 STEPS = 6  # of a fit between two of these
+MOVED = 9.0  # fall of the cost from which on a fit may have more to gain: three standard deviations, squared
 RIVALS, ROUGH = 3, 4  # candidates that are fitted in the place of coloured noise, and steps of their fits
 LOUDEST = (
     10.0  # noise at its loudest frequency over that at the highest ones: pink noise of a whole test has less
@@ -40,11 +41,12 @@ def settled(fit: Fit) -> Fit:
         return fit
     found, data = fit, sensor_noise.remodelled(fit)
     for _ in range(ROUNDS):
-        if not sensor_noise.coloured(data):
+        if not sensor_noise.altered(data):
             break
-        found = again(found, data)
+        before, found = fitting.at(data, found.values, found.z), again(found, data)
         better = sensor_noise.remodelled(found)
-        if not quieter(better, data):
+        still = before.cost - found.cost < MOVED
+        if still and not (quieter(better, data) or shifted(better, data)):
             break
         data = better
     else:
@@ -57,6 +59,19 @@ def settled(fit: Fit) -> Fit:
     return under_white(found, data, fit.data)
 
 
+def shifted(after: Data, before: Data) -> bool:
+    """Whether the lines of any signal have changed by a visible share of its noise.
+
+    A loud hum takes parameters along with it, and these spoil its first estimate.
+    """
+    if after.lines is None and before.lines is None:
+        return False
+    none = np.zeros_like(after.part.measured)
+    apart = (none if after.lines is None else after.lines) - (none if before.lines is None else before.lines)
+    rms = np.sqrt(np.mean(np.square(apart), axis=0))
+    return bool(np.any(rms > MATERIAL * after.white))
+
+
 def under_white(fit: Fit, data: Data, before: Data) -> Fit:
     """The fit under white noise: that of `before` where it is no lower."""
     changed = bool(before.noise) or data.lines is not None or data.spikes is not None
@@ -66,8 +81,8 @@ def under_white(fit: Fit, data: Data, before: Data) -> Fit:
 
 
 def again(fit: Fit, data: Data) -> Fit:
-    """A fit moved to the best parameters under another noise; white noise leaves it where it is."""
-    if sensor_noise.coloured(data):
+    """A fit moved to the best parameters under another noise; white noise alone leaves it where it is."""
+    if sensor_noise.altered(data):
         return fitting.fit(data, fit.values, fit.z, STEPS, rounds=1)
     return fitting.at(data, fit.values, fit.z)
 
@@ -75,18 +90,21 @@ def again(fit: Fit, data: Data) -> Fit:
 def hidden(fit: Fit) -> bool:
     """Whether the noise that a fit is measured by may hold a gap.
 
-    Something is left beside that noise, and either the inputs foresee it or the noise is far louder at some frequency
-    than at the highest ones, as the noise of no sensor is; or it comes and goes, or what effects leave would be a
-    large share of a reading.
+    The inputs foresee more of it than two good solutions of one model differ by; or something is left beside that
+    noise, and it is far louder at some frequency than at the highest ones, as the noise of no sensor is; or it comes
+    and goes, or what effects leave would be a large share of a reading.
     """
     if fit.names and sensor_noise.share(fit.data) > SMALL:
         return True
+    allowed = model_error(fit)
+    least = np.maximum(MATERIAL, allowed)
     seen = any(
-        item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in sensor_noise.foreseen(fit)
+        item.ratio > limit and item.significance > SIGNIFICANT
+        for item, limit in zip(sensor_noise.foreseen(fit), least, strict=True)
     )
     loud = sensor_noise.loudest(fit) > LOUDEST
     uneven = np.array([item.tails > UNEVEN for item in fit.data.noise])
-    return seen or bool(np.any(loud & uneven)) or (bool(np.any(loud)) and leaves(fit))
+    return seen or bool(np.any(loud & uneven)) or (bool(np.any(loud)) and leaves(fit, allowed))
 
 
 def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
@@ -99,10 +117,21 @@ def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
     if not sensor_noise.coloured(bare.data):
         return bare, []
     fits = in_white_noise(bare, scales)
-    if not fits or not far_likelier(fits[0], bare):
+    if not fits or not far_likelier(remodelled(fits[0]), bare):
         return bare, []
-    best = settled(fits[0])
+    best, bare = settled(fits[0]), as_near(bare, fits[0])
+    if not far_likelier(best, bare):
+        return bare, []
     return again(bare, best.data), [best, *(again(item, best.data) for item in fits[1:])]
+
+
+def as_near(bare: Fit, fit: Fit) -> Fit:
+    """The fit without effects, from where it is or from the nominal parameters of another fit: the better one.
+
+    A fit under white noise may take slow noise for a delay, which a few steps under coloured noise do not undo.
+    """
+    other = again(fitting.at(bare.data, {}, fit.z), bare.data)
+    return min(bare, other, key=lambda item: float(np.sum(item.reduced**2)) + item.prior)
 
 
 def in_white_noise(bare: Fit, scales: Scales) -> list[Fit]:
@@ -119,7 +148,11 @@ def in_white_noise(bare: Fit, scales: Scales) -> list[Fit]:
     return sorted(whole, key=lambda item: item.cost)
 
 
+def remodelled(fit: Fit) -> Fit:
+    """A fit, measured by the noise that it leaves."""
+    return fitting.at(sensor_noise.remodelled(fit), fit.values, fit.z)
+
+
 def far_likelier(fit: Fit, bare: Fit) -> bool:
-    """Whether the data are far more probable under a fit and the noise that it leaves than without effects."""
-    found = fitting.at(sensor_noise.remodelled(fit), fit.values, fit.z)
-    return evidence.surprise(found) < evidence.surprise(bare) - evidence.BEYOND
+    """Whether the data are far more probable under a fit and its noise than under the one without effects."""
+    return evidence.surprise(fit) < evidence.surprise(bare) - evidence.BEYOND

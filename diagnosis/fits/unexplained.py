@@ -13,6 +13,7 @@ import numpy as np
 from diagnosis.fits import sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.sensor_noise import Foreseen
+from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.signals.noise_model import NoiseModel
 from models.registry import Array
 
@@ -23,6 +24,8 @@ MATERIAL = 0.12  # systematic residual over noise below which a gap would intere
 SIGNIFICANT = (
     5.0  # standard deviations from which on it is no chance, with all signals and time scales looked at
 )
+
+BOTH = 2.0  # solutions with an error of their own: the laboratory's and the replay's
 
 
 class SystematicGap(NamedTuple):
@@ -60,6 +63,14 @@ def gaps(fit: Fit, group: int) -> list[SystematicGap]:
 def remaining(fit: Fit) -> float:
     """Largest systematic residual over noise that a fit leaves."""
     return max((item.ratio for item in gaps(fit, fit.data.group)), default=0.0)
+
+
+def model_error(fit: Fit) -> Array:
+    """What two good solutions of one model may differ by, (signals,) over σ; zero where the part is exact."""
+    if fit.data.part.exact:
+        return np.zeros(fit.data.sigma.size)
+    level = np.sqrt(np.mean(np.square(fit.data.part.measured), axis=0))
+    return np.asarray(BOTH * MODEL_ERROR * level / fit.data.sigma)
 
 
 def leaves(fit: Fit, allowed: Array | None = None) -> bool:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from common.recording.imported import NOTHING_STATED
 from common.roles import MASTER
 from diagnosis.recorded.nuisances import Nuisance
 from diagnosis.recorded.parts import of_sites
@@ -29,6 +32,17 @@ class Ground:
         self.present = record.present["ground_acceleration"][:, None]
         self.nuisances: tuple[Nuisance, ...] = ()
         self.candidates = of_sites(record, ("ground",), record.plan)
+        stated = record.stated
+        rows = stated.channel(MASTER, self.signals[0]) if stated else NOTHING_STATED
+        self.blur = self.interpolated(rows.rate) if rows.interpolated and rows.rate > 0.0 else 0.0
+
+    def interpolated(self, rate: float) -> float:
+        """Rms error (m/s²) of the plan's motion once it is sampled at `rate` (Hz) and interpolated onto the ticks."""
+        ticks = np.arange(self._believed.shape[1]) * self._interval
+        rows = np.arange(math.ceil(ticks[-1] * rate) + 1) / rate
+        motion = self._believed[0]
+        again = np.interp(ticks, rows, np.interp(rows, ticks, motion))
+        return float(np.sqrt(np.mean(np.square(again - motion))))
 
     def predict(self, system: System) -> Array:
         """Ground acceleration."""

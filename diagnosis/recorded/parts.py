@@ -117,7 +117,7 @@ class LaboratoryPart:
         self.units = {name: record.unit(name) for name in self.devices}
         none = np.zeros(record.ticks)
         self.inputs = {name: record.signals.get(name, none) for name in self.devices}
-        self.wanted = self.inputs | self.targets(record)
+        self.wanted = self.targets(record)
         self.measured, self.present = outputs(record, self.signals)
         machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]
         names = tuple(name for machine in machines for name in machine.parameters)
@@ -136,10 +136,19 @@ class LaboratoryPart:
         self._start = float(first) if abs(first) > UNREST * most else 0.0
 
     def targets(self, record: Record) -> dict[str, Array]:
-        """Targets by command: unlike commands, these are free of the sensors' noise that a controller feeds back."""
+        """What moves the laboratory, by command, without the noise of its sensors that a controller feeds back.
+
+        It is the target in the place of the transfer system's command. Where no target was recorded that command is
+        left out: the readings predicted from it hold its motion, and its noise behind the lag of the machine only.
+        """
         channels = self.lab.kind.channels
         command, target = self.lab.signal(channels.command.name), self.lab.signal(channels.target.name)
-        return {command: record.signals[target]} if command in self.inputs and record.has(target) else {}
+        known = {command: record.signals[target]} if record.has(target) else {}
+        return {
+            name: known.get(name, values)
+            for name, values in self.inputs.items()
+            if name != command or name in known
+        }
 
     def moves(self, record: Record, machine: Machine) -> bool:
         """Whether a machine is driven at all."""
@@ -191,16 +200,17 @@ class LaboratoryPart:
             result.anew = self.anew[self.anew[:, 0] < ticks]
         return result
 
-    def logged(self, delay: float) -> LaboratoryPart:
-        """The same laboratory with readings from a logger that delayed the forces in use by `delay` s.
+    def logged(self, delay: float, spread: float | None = None) -> LaboratoryPart:
+        """The same laboratory with readings from a logger that delayed other channels by `delay` s.
 
         What a logger does to one channel it mostly does to all, to forces as to the others, which have amplifiers of
-        their own. Where a delay, a filter or a calibration is stated for a channel, that is not changed.
+        their own; `spread` is the standard deviation of their delays, s. Where a delay, a filter or a calibration is
+        stated for a channel, that is not changed.
         """
         names, about = self.lab.kind.channels.names, max(0.0, delay)
         late: tuple[LoggedReadings, ...] = ()
         if not any(channel.filter is not None or channel.delay != 0.0 for channel in self.channels):
-            tolerance = max(ALIKE, UNLIKE * about)
+            tolerance = spread or max(ALIKE, UNLIKE * about)
             rows = self.lab.kind.channels.measured
             late = tuple(
                 LoggedReadings("delay", tolerance, self.lab, those, about)
@@ -212,6 +222,15 @@ class LaboratoryPart:
         if not any(channel.calibration > 0.0 for channel in self.channels):
             late = (*late, LoggedReadings("gain", CALIBRATED, self.lab, names))
         return self.replaced(nuisances=(*self.nuisances, *late))
+
+    def late(self, z: Array) -> list[float]:
+        """Delays (s) of the logger's groups of channels, at values z (nuisances,) of a fit; empty without a logger."""
+        rows = zip(self.nuisances, z, strict=True)
+        return [
+            one.about + float(x) * one.tolerance
+            for one, x in rows
+            if isinstance(one, LoggedReadings) and one.parameter == "delay"
+        ]
 
     def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""

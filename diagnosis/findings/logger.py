@@ -1,0 +1,66 @@
+"""The data logger between an imported recording and its laboratories: a delay and an interpolation of all channels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from diagnosis.findings.found import Diagnosis
+from diagnosis.fits import fitting, hypothesis, residuals
+from diagnosis.fits.fitting import Fit
+from diagnosis.recorded.ground import Ground
+from diagnosis.recorded.parts import ALIKE, LATE, LaboratoryPart, Part
+from diagnosis.recorded.record import Record
+
+# Share of a reading's rms that a nominal model leaves, from which on an effect is at work: noise, a hum of 1 % of the
+# peak and a converter together leave up to 4 %.
+SPOILT = 0.05
+
+
+def interpolated(parts: Sequence[Part]) -> dict[str, float]:
+    """The step whose rounding would be as large as the error of an interpolated ground motion, by signal."""
+    grounds = [part for part in parts if isinstance(part, Ground)]
+    return {part.signals[0]: math.sqrt(12.0) * part.blur for part in grounds if part.blur > 0.0}
+
+
+def common_delay(parts: Sequence[Part], record: Record, steps: Mapping[str, float]) -> float:
+    """Delay (s) of a logger by which every channel of several laboratories is late at least, 0 where one is not.
+
+    A filter or a logger delays all of its channels; an effect delays those of one machine. A laboratory that its
+    nominal model misses by far tells nothing of the logger, as long as another one does.
+    """
+    labs = [part.logged(0.0, LATE) for part in parts if isinstance(part, LaboratoryPart)]
+    if len(labs) < 2:
+        return 0.0
+    fits = [fitting.fit(residuals.prepare(lab, record, steps), {}) for lab in labs]
+    near = [missed(fit) < SPOILT for fit in fits]
+    found = [
+        delay
+        for lab, fit, yes in zip(labs, fits, near, strict=True)
+        if yes or not any(near)
+        for delay in lab.late(fit.z)
+    ]
+    return max(0.0, min(found, default=0.0))
+
+
+def missed(fit: Fit) -> float:
+    """Largest share of a reading's rms that a fit leaves."""
+    left = fit.data.residual(hypothesis.lay(fit.data, fit.z, fit.values))
+    there = fit.data.part.present
+    level, rest = (
+        np.sqrt(np.sum(np.square(np.where(there, x, 0.0)), axis=0)) for x in (fit.data.part.measured, left)
+    )
+    return float(np.max(rest[level > 0.0] / level[level > 0.0], initial=0.0))
+
+
+def remarks(found: Diagnosis) -> list[str]:
+    """A sentence where all readings of an import are late alike."""
+    late = min((delay for delay, _ in found.logger.values()), default=0.0)
+    if late < ALIKE:
+        return []
+    return [
+        f"All readings come {1e3 * late:.2g} ms late or more, which is taken for the data logger's delay: state "
+        "filter or delay of the channels in the import map to have effects of such a delay judged."
+    ]
