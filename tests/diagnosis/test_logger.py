@@ -1,0 +1,113 @@
+"""Recordings that a data logger made beside the controllers: late, filtered, humming, at a rate of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from common.recording.imported import IMPORT
+from diagnosis.diagnose import examine
+from diagnosis.findings import logger
+from diagnosis.findings.found import Diagnosis
+from diagnosis.fits import residuals, sensor_noise
+from diagnosis.recorded.divided import parts_of
+from diagnosis.recorded.ground import Ground
+from diagnosis.recorded.record import Record
+from models.registry import Array
+from tests.diagnosis.cases import Cases, lab_a
+
+UNKNOWN_TO_A_LOGGER = ("damper_force_used", "column_target", "table_target")
+FILTER = signal.butter(4, 100.0, fs=500.0)  # before the converter, Hz
+FILTERED = 2.613 / (2.0 * 500.0 * np.tan(np.pi * 100.0 / 500.0))  # s, by which it delays slow motion
+FRICTION = {"column.friction": {"force": 900.0}}
+
+
+def imported(whole: Record, change: Callable[[Array], Array] = lambda x: x) -> Record:
+    """The record as an import of what a logger made of every reading; it holds no targets and no force used."""
+    read = {name for lab in whole.labs for name in lab.measured}
+    signals = {
+        name: change(values) if name in read else values
+        for name, values in whole.signals.items()
+        if name not in UNKNOWN_TO_A_LOGGER
+    }
+    metadata = whole.run.metadata | {IMPORT: {"data": "measurements.csv"}}
+    return replace(whole, signals=signals, run=replace(whole.run, metadata=metadata))
+
+
+def filtered(values: Array) -> Array:
+    """A reading behind the logger's low-pass filter."""
+    return np.asarray(signal.lfilter(*FILTER, values - values[0]) + values[0])
+
+
+def hum(values: Array) -> Array:
+    """A reading with a hum of 1 % of its peak."""
+    wave = np.sin(2.0 * np.pi * 50.0 * 0.002 * np.arange(values.size) + 0.4)
+    return values + 0.01 * float(np.max(np.abs(values))) * wave
+
+
+def delay(whole: Record) -> float:
+    """The delay that is found to be common to all channels, s."""
+    return logger.common_delay(parts_of(whole), whole, {})
+
+
+def outcomes(found: Diagnosis) -> dict[str, str]:
+    """The outcome of every part by its name."""
+    return {verdict.search.data.part.name: verdict.outcome for verdict in found.verdicts}
+
+
+def test_a_filter_before_every_channel_is_a_delay_of_the_logger(cases: Cases) -> None:
+    assert delay(imported(cases.record(), filtered)) == pytest.approx(FILTERED, abs=5e-4)
+    assert delay(imported(cases.record())) < 5e-4
+
+
+def test_a_delay_of_one_laboratory_is_not_the_loggers(cases: Cases) -> None:
+    assert delay(imported(cases.record({"actuator.delay": {"delay": 0.006}}))) < 5e-4
+
+
+def test_a_laboratory_with_an_effect_does_not_hide_the_loggers_delay(cases: Cases) -> None:
+    assert delay(imported(cases.record(FRICTION), filtered)) == pytest.approx(FILTERED, abs=5e-4)
+
+
+def test_a_filter_that_nobody_stated_is_no_effect_and_is_said(cases: Cases) -> None:
+    found = examine(imported(cases.record(), filtered))
+    assert not [name for verdict in found.verdicts for name in verdict.effects]
+    assert set(outcomes(found).values()) <= {"none", "tolerances"}
+    assert [text for text in found.warnings if "data logger's delay" in text]
+    assert found.logger["column_force"][0] == pytest.approx(FILTERED, abs=1e-3)
+
+
+def test_a_hum_far_above_the_noise_is_no_gap(cases: Cases) -> None:
+    found = examine(imported(cases.record(), hum))
+    assert set(outcomes(found).values()) <= {"none", "tolerances"}
+    lines = {line for verdict in found.verdicts for item in verdict.search.data.noise for line in item.lines}
+    assert lines == {50.0}
+
+
+def test_an_effect_keeps_its_name_beside_a_loud_hum(cases: Cases) -> None:
+    found = examine(imported(cases.record(FRICTION), hum))
+    assert next(item.effects for item in found.verdicts if item.effects) == ("column.friction",)
+
+
+def test_noise_that_a_controller_feeds_back_is_not_foreseen_by_commands(cases: Cases) -> None:
+    whole = imported(cases.record())
+    assert "actuator_command" not in lab_a(whole).wanted
+    assert "actuator_command" in lab_a(cases.record()).wanted
+    data = residuals.prepare(lab_a(whole), whole)
+    noise = np.random.default_rng(3).standard_normal((data.groups, 2)) * data.sigma
+    data = replace(data, related=sensor_noise.related(data, data.system))
+    assert float(np.std(sensor_noise.predictable(data, noise) / data.sigma)) < 0.1
+
+
+def test_the_error_of_an_interpolated_ground_motion_is_known(cases: Cases) -> None:
+    whole = cases.record()
+    assert whole.ground is not None
+    part = Ground(whole, whole.ground)
+    ticks, rows = whole.time, np.arange(0.0, whole.time[-1] + 1e-3, 1.0 / 1024.0)
+    again = np.interp(ticks, rows, np.interp(rows, ticks, whole.signals["ground_acceleration"]))
+    error = float(np.sqrt(np.mean((again - whole.signals["ground_acceleration"]) ** 2)))
+    assert part.blur == 0.0
+    assert part.interpolated(1024.0) == pytest.approx(error, rel=0.02)
