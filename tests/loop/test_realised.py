@@ -281,7 +281,7 @@ def test_effects_are_refused_on_a_plug_in_rig_of_a_named_slave() -> None:
     ("entry", "words"),
     [
         (effect("colum.friction", force=900.0), ("colum.friction", "did you mean column.friction")),
-        (effect("column.friction", force=-1.0), ("force", "-1.0", "30000")),
+        (effect("column.friction", force=-1.0), ("force", "-1.0", "at most 1e+07 N")),
         (effect("column.friction"), ("force", "missing")),
         (effect("column.friction", force=900.0, weight=1.0), ("weight", "column.friction")),
         (effect("column.friction", force=math.nan), ("force", "nan")),

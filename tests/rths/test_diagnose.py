@@ -83,7 +83,7 @@ def left(measured: Path, simulated: Path) -> float:
     held, gaps = held_out(one), []
     for name in one.responses:
         there, shown = one.signals[name][held], other.signals[name][held]
-        gaps.append(np.sqrt(np.mean(np.square(there - shown)) / np.mean(np.square(there))))
+        gaps.append(float(np.sqrt(np.mean((there - shown) ** 2))) / float(np.sqrt(np.mean(there**2))))
     return float(np.sqrt(np.mean(np.square(gaps))))
 
 
