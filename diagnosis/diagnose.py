@@ -26,12 +26,7 @@ from diagnosis.recorded.divided import driven, parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.joined import joined, refuse_others
 from diagnosis.recorded.link import LinkFinding
-from diagnosis.recorded.parts import (
-    Building,
-    LaboratoryPart,
-    LoggedBuilding,
-    Part,
-)
+from diagnosis.recorded.parts import Building, LaboratoryPart, LoggedBuilding, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from models.system import System
 

@@ -26,6 +26,7 @@ from diagnosis.recorded.nuisances import (
     of_building,
 )
 from diagnosis.recorded.record import Record
+from diagnosis.signals.earlier import earlier
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
 from laboratories.kind import Machine
@@ -330,20 +331,6 @@ class Building:
     def first(self, ticks: int) -> Building:
         """The whole of it, because it is computed and cheap."""
         return self
-
-
-def earlier(x: Array, ticks: float) -> Array:
-    """Series (n, …) advanced by this many ticks, by the phases of their spectra: white noise keeps its level.
-
-    On straight lines between samples noise is smaller, and a delay would be found where there is none. Before the first
-    and after the last sample the series turn back.
-    """
-    if ticks == 0.0:
-        return x
-    lines = np.fft.rfft(np.concatenate([x, x[::-1]]), axis=0)
-    turns = np.exp(2j * np.pi * np.fft.rfftfreq(2 * len(x)) * ticks)
-    moved = np.fft.irfft(lines * turns.reshape(-1, *[1] * (x.ndim - 1)), 2 * len(x), axis=0)
-    return np.asarray(moved[: len(x)])
 
 
 class LoggedBuilding(Building):

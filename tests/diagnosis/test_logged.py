@@ -14,9 +14,10 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import residuals
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
-from diagnosis.recorded.parts import Building, LoggedBuilding, earlier
+from diagnosis.recorded.parts import Building, LoggedBuilding
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import HowFar
+from diagnosis.signals.earlier import earlier
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_a, white
 
