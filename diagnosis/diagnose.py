@@ -26,7 +26,8 @@ from diagnosis.recorded.divided import driven, parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.joined import joined, refuse_others
 from diagnosis.recorded.link import LinkFinding
-from diagnosis.recorded.parts import Building, LaboratoryPart, LoggedBuilding, Part
+from diagnosis.recorded.logged_building import LoggedBuilding, logged
+from diagnosis.recorded.parts import Building, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from models.system import System
 
@@ -137,20 +138,20 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
 
 def other_view(part: Part, record: Record, steps: Mapping[str, float]) -> Data | None:
     """A building as one whose forces a logger recorded, None for all else."""
-    logged = part.logged() if isinstance(part, Building) else None
-    return None if logged is None else residuals.prepare(logged, record, logged.rounded(steps))
+    view = logged(part) if isinstance(part, Building) else None
+    return None if view is None else residuals.prepare(view, record, view.rounded(steps))
 
 
-def judged(data: Data, scales: Scales, logged: Data | None = None) -> PartVerdict:
+def judged(data: Data, scales: Scales, view: Data | None = None) -> PartVerdict:
     """The verdict on a part; a building that no effect makes exact is judged as one whose forces a logger recorded.
 
     It is so from the start where the forces recorded have noise that those used had not.
     """
-    if logged is None or not own_noise(logged):
+    if view is None or not own_noise(view):
         verdict = judge(search(data, scales))
-        if logged is None or verdict.outcome not in UNNAMED:
+        if view is None or verdict.outcome not in UNNAMED:
             return verdict
-    return judge(search(logged, scales))
+    return judge(search(view, scales))
 
 
 def own_noise(data: Data) -> bool:

@@ -11,7 +11,8 @@ from diagnosis.findings.gaps import QUIET
 from diagnosis.findings.verdict import PartVerdict, heard
 from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.residuals import Data
-from diagnosis.recorded.parts import BALANCE, ColumnAlone, LaboratoryPart
+from diagnosis.recorded.logged_building import BALANCE
+from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import NoiseEntry, PartOfGap
 from diagnosis.signals.noise_model import NoiseModel

@@ -18,7 +18,8 @@ from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.joined import JoinedPart
-from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, LoggedBuilding, Part
+from diagnosis.recorded.logged_building import LoggedBuilding
+from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
 from diagnosis.signals import colour, pickup
 from diagnosis.signals.ceiling import Crosswise
 from diagnosis.signals.features import features

@@ -7,7 +7,7 @@ readings by the sensors' noise alone, and a gap in one part does not enter anoth
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,7 +17,6 @@ from common.recording.imported import NOTHING_STATED
 from common.roles import MASTER
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import (
-    LoggedForce,
     LoggedReadings,
     Nuisance,
     calibrations,
@@ -26,17 +25,13 @@ from diagnosis.recorded.nuisances import (
     of_building,
 )
 from diagnosis.recorded.record import Record
-from diagnosis.signals.earlier import earlier
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
 from laboratories.kind import Machine
 from loop import replay
-from loop.nominal import partition
 from models.registry import Array
-from models.structures import shear_building
 from models.system import System
 
-BALANCE = "force_balance"  # signal of a building that is judged by the balance of its forces, N
 # Share of a computed signal's rms below which a difference is rounding of the recording: four digits of a text file.
 EXACT = 1e-4
 UNREST = 0.05  # first value over the largest one from which on a record does not begin at rest
@@ -289,7 +284,7 @@ class Building:
         read = [record.signals[name] for name in names] or [none, none]
         self._inputs = (read[0], read[1], used)
         self._force = own.kind.channels.force if own else ""
-        self._plan, self._whole = plan, record.has(*type(self).signals)
+        self._plan, self.whole = plan, record.has(*type(self).signals)
         self._stated = (
             channels(record, own)[own.kind.channels.names.index(self._force)] if own else NOTHING_STATED
         )
@@ -324,77 +319,6 @@ class Building:
         """Position and force of the master's laboratory and the forces of the others, as the master used them."""
         return self._inputs
 
-    def logged(self) -> LoggedBuilding | None:
-        """The same building, of which the forces used are known up to a logger's noise; None without its motion."""
-        return LoggedBuilding(self) if self._whole else None
-
     def first(self, ticks: int) -> Building:
         """The whole of it, because it is computed and cheap."""
         return self
-
-
-class LoggedBuilding(Building):
-    """The numerical substructure whose forces came through a logger, by the balance of its forces.
-
-    The motion is the master's own and free of noise, so what the equation of motion says of it differs from the forces
-    recorded by their logger's noise alone, sample by sample. In the displacement that noise would have gone through
-    the building, and would look like a motion. The logger's delay and gain join the nominal parameters; what it does to
-    one force it mostly does to all.
-    """
-
-    exact = False
-
-    def __init__(self, of: Building) -> None:
-        self.__dict__.update(of.__dict__)
-        self.motion = of.measured
-        plan = self._plan
-        self._nominal = System(plan)
-        self.signals = (BALANCE,) * plan.storeys
-        self.measured = self.balance(self._nominal, self.motion)
-        self.present = of.present[:, : plan.storeys]
-        self.about = self._stated.late
-        late = LATE if self.about == 0.0 else max(ALIKE, UNLIKE * self.about)
-        rows = (("delay", late, self.about), ("gain", self._stated.calibration or CALIBRATED, 0.0))
-        logger = tuple(LoggedForce(name, by, None, self._force, at) for name, by, at in rows if self._force)
-        self.nuisances = (*of.nuisances, *logger)
-
-    def balance(self, system: System, motion: Array) -> Array:
-        """M·ẍ + C·ẋ + K·x of the numerical part, (ticks, storeys) N, for displacement, velocity and acceleration."""
-        M, C, K = partition.numerical(system.plan)
-        gravity = shear_building.tridiagonal(np.full(len(M), system.effects.p_delta))
-        x, v, a = np.split(motion, 3, axis=1)
-        return np.asarray(a @ M.T + v @ C.T + x @ (K + gravity).T)
-
-    def predict(self, system: System) -> Array:
-        """The balance of the nominal building, less the residual balance of the hypothesis.
-
-        What it leaves is at the time and in the unit of the reading, so that neither delay nor gain changes its noise.
-        """
-        delay, gain = self.logger(system)
-        apart = self.balance(system, self.motion - super().predict(system))
-        return self.measured - gain * earlier(apart, -delay / self._interval)
-
-    def forces(self, system: System) -> tuple[Array, Array, Array]:
-        """Position and force of the master's laboratory and the forces of the others, as the master used them."""
-        position, force, used = self._inputs
-        delay, gain = self.logger(system)
-        ticks = delay / self._interval
-        return position, earlier(force, ticks) / gain, earlier(used, ticks) / gain
-
-    def logger(self, system: System) -> tuple[float, float]:
-        """Delay (s) and gain of the logger in a hypothesis."""
-        made = system.effects.sensors.get(self._force)
-        return (made.delay, made.gain) if made else (self.about, 1.0)
-
-    def rounded(self, steps: Mapping[str, float]) -> dict[str, float]:
-        """The step of the balance where the force is rounded to one of `steps`, by signal."""
-        return {BALANCE: self._scale * steps[self._force]} if self._force in steps else {}
-
-    def late(self, z: Array) -> float:
-        """Delay (s) of the logger that recorded the force, at values z (nuisances,) of a fit."""
-        rows = zip(self.nuisances, z, strict=True)
-        return sum(
-            one.about + float(x) * one.tolerance
-            for one, x in rows
-            if isinstance(one, LoggedForce) and one.parameter == "delay"
-        )

@@ -14,7 +14,9 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import residuals
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
-from diagnosis.recorded.parts import Building, LoggedBuilding
+from diagnosis.recorded import logged_building
+from diagnosis.recorded.logged_building import LoggedBuilding
+from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import HowFar
 from diagnosis.signals.earlier import earlier
@@ -32,7 +34,7 @@ def relogged(whole: Record, name: str, values: Array) -> Record:
 
 def logged(whole: Record) -> residuals.Data:
     """The building of a record as a part that is judged by its balance of forces."""
-    part = Building(whole).logged()
+    part = logged_building.logged(Building(whole))
     assert part is not None
     return residuals.prepare(part, whole)
 
