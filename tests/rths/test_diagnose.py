@@ -61,7 +61,11 @@ def test_diagnose_writes_report_page_and_summary(
     assert report["which"][0]["effects"] == ["damper.friction"]
     assert report["details"]["test"]["file"] == path.name
     assert report["found"] == str(reality)
-    assert tomllib.loads(reality.read_text(encoding="utf-8"))["found"]["recording"] == path.name
+    written = tomllib.loads(reality.read_text(encoding="utf-8"))
+    assert written["found"]["recording"] == path.name
+    stated = report["which"][0]["parameters"]["damper.friction"]["force"]
+    assert stated["value"] == written["effect"][0]["force"]  # to the last bit
+    assert stated["interval"][0] <= stated["value"] <= stated["interval"][1]
     corrected = tmp_path / "corrected.mcap"
     assert call("simulate", "default", "--duration", 8, "--reality", reality, "-o", corrected) == 0
     capsys.readouterr()

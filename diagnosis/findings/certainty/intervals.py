@@ -2,6 +2,8 @@
 
 The parameters of a verdict are fitted once more to all rows of a recording. A selection of effects must not see the
 withheld ones; once it is made, they make the parameters surer, and so no interval rests on a part of the motion only.
+The value beside an interval is that of the selection: how far a gap closes is judged with it, on rows it has not seen,
+and `--found` writes it.
 """
 
 from __future__ import annotations
@@ -119,7 +121,7 @@ def refined(fit: Fit) -> Fit:
 
 
 def intervals(verdict: PartVerdict) -> dict[str, dict[str, Interval]]:
-    """Parameters of the effects that a verdict names, fitted to all rows, with their 95 % intervals."""
+    """Parameters of the effects that a verdict names as selected, with 95 % intervals by a fit to all rows."""
     search = verdict.searched
     fit = refined(search.chosen)
     problem, sure = Problem(fit.data, fit.values), spread(fit)
@@ -134,12 +136,13 @@ def intervals(verdict: PartVerdict) -> dict[str, dict[str, Interval]]:
         ends = (place[i] + end for end in mixed(half, others))
         down, up = (item.outward(float(np.clip(end, low[i], high[i]))) for end in ends)
         edge = 1e-6 * (high[i] - low[i])
+        value = search.chosen.values[item.effect][item.parameter.name]
         result.setdefault(item.effect, {})[item.parameter.name] = Interval(
-            fit.values[item.effect][item.parameter.name],
-            min(down, up),
-            max(down, up),
+            value,
+            min(down, up, value),
+            max(down, up, value),
             item.parameter.unit,
-            not low[i] + edge < place[i] < high[i] - edge,
+            not low[i] + edge < item.inward(value) < high[i] - edge,
         )
     return result
 
