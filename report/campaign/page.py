@@ -11,7 +11,7 @@ from simulation.campaign.course import endured, of
 from simulation.campaign.goal import BY_HAND, REAL_TIME, VIRTUAL, Goal
 from simulation.campaign.steps import DiagnosedStep, PlayedStep, Step
 
-SAID = (
+METHOD = (
     "Before each test every candidate is simulated in the laboratories as found so far, under each plausible cause. "
     "Its expected information says how many bits it would add to what is known of the cause. A test may be played if "
     "under no plausible cause it passes a limit."
@@ -28,7 +28,7 @@ def page(goal: Goal, steps: Sequence[Step]) -> str:
         test=goal.plan.test.name,
         facts=facts(goal, steps),
         sentences=[tables.ending(goal, steps)],
-        said=SAID,
+        method=METHOD,
         tests=tables.overview(goal, steps),
         files=[(one.file, diagnoses(goal, one.test)) for one in every],
         probabilities=pictures.probabilities(steps) if of(steps, DiagnosedStep) else None,

@@ -39,13 +39,13 @@ class TestOfCampaign(NamedTuple):
 def tests(steps: Sequence[Step]) -> list[TestOfCampaign]:
     """The tests in their order."""
     played = {one.test: one for one in of(steps, PlayedStep)}
-    said = {one.test: one for one in of(steps, DiagnosedStep)}
+    diagnosed = {one.test: one for one in of(steps, DiagnosedStep)}
     begun = of(steps, BegunStep)
     found = []
     for one in of(steps, DecidedStep):
-        before = said.get(one.test - 1)
+        before = diagnosed.get(one.test - 1)
         options = before.options if before else begun[0].options
-        found.append(TestOfCampaign(one, options, played.get(one.test), said.get(one.test)))
+        found.append(TestOfCampaign(one, options, played.get(one.test), diagnosed.get(one.test)))
     return found
 
 
@@ -57,7 +57,7 @@ def lines(goal: Goal, steps: Sequence[Step]) -> Iterator[str]:
         if one.played:
             yield f"  played: {one.played.outcome}, {strained(one.played)}"
         if one.diagnosed:
-            yield f"  found: {said(one.diagnosed)}"
+            yield f"  found: {causes_found(one.diagnosed)}"
     for cut in of(steps, InterruptedStep):
         yield f"test {cut.test} was interrupted once: {strained(cut)}; its recording is {cut.file}"
     yield ending(goal, steps)
@@ -80,7 +80,7 @@ def strained(one: RecordedStep) -> str:
     return f"drift {quantity(one.drift, 'm')}, {quantity(one.energy, 'J')} absorbed"
 
 
-def said(one: DiagnosedStep) -> str:
+def causes_found(one: DiagnosedStep) -> str:
     """Status, gap and causes of a diagnosis."""
     causes = ", ".join(f"{named(each.effects)} {percent(each.probability)}" for each in one.causes[:SHOWN])
     return f"{one.status.replace('_', ' ')}, {percent(one.gap)} of gap left; {causes}"

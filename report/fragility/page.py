@@ -7,7 +7,7 @@ from report.fragility.curves import Curves
 from report.page import frame, render
 from report.text.formats import quantity
 
-SAID = (
+METHOD = (
     "The chance follows the lognormal distribution of greatest likelihood for the tests that passed the limit at each "
     "intensity. The intervals hold for tests that are independent of each other; tests of few records are not, and "
     "other records may give another curve."
@@ -27,7 +27,7 @@ def page(found: Curves) -> str:
         "fragility.html",
         quantity=found.quantity,
         facts=facts,
-        said=SAID,
+        method=METHOD,
         picture=pictures.drawing(found),
         fits=tables.fits(found),
         missing=tables.missing(found),

@@ -77,7 +77,7 @@ def rig(report: Report) -> dict[str, Any] | None:
     places |= {"link": LINK, **dict(zip(other.sites, OTHER, strict=False))} if other else {}
     sensors = (own_sensors(own) if own else {}) | (other_sensors(other) if other else {})
     return {
-        "said": f"The rig; shares of the gap: {named}",
+        "description": f"The rig; shares of the gap: {named}",
         "height": WIDE if other else LOW,
         "arrows": [*BUILDING_ARROWS, *own_arrows(own), *other_arrows(other)],
         "notes": [

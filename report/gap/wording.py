@@ -121,13 +121,13 @@ def kind(candidate: Candidate | Evidence) -> str:
 def parameters(candidate: Candidate | Evidence) -> list[tuple[str, str, str]]:
     """A candidate's parameters: effect, parameter, value with interval and unit."""
     return [
-        (name, parameter, told(name, parameter, given))
+        (name, parameter, parameter_value(name, parameter, given))
         for name, entries in candidate.parameters.items()
         for parameter, given in entries.items()
     ]
 
 
-def told(name: str, parameter: str, given: Value) -> str:
+def parameter_value(name: str, parameter: str, given: Value) -> str:
     """A parameter's value with its interval and unit; of an effect with several formulas the name of the one chosen."""
     entry = CATALOGUE.get(placed(name, 2)[0])
     if parameter == "law" and entry and entry.laws and given.value is not None:

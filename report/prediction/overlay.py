@@ -11,7 +11,7 @@ from common.recording.run import Run, Values
 from report.facts.laboratories import whole_plan
 from report.page import data_uri, frame, render
 from report.pictures import figure
-from report.prediction import said
+from report.prediction import sentences
 from report.prediction.pictures import ROW, as_png, rows
 from report.run.drawing import DrawnPicture
 from report.text.formats import axis_scale, quantity
@@ -44,7 +44,7 @@ def page(found: Held, measured: Run, predicted: Run) -> str:
             ("predicted", predicted.path.name),
             ("compared", f"{found.ticks} ticks"),
         ],
-        sentences=said.sentences(found),
+        sentences=sentences.every(found),
         picture=histories(overlays(before_hold(measured)[0], predicted)),
         signals=signals(found),
     )

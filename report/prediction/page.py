@@ -6,7 +6,7 @@ from report.page import frame, render
 from report.prediction import pictures, tables
 from simulation.prediction.bands import Prediction
 
-SAID = (
+METHOD = (
     "The parameters of each laboratory are drawn from the uncertainty of the diagnosis, and its sensors have the noise "
     "that was found. Each signal has an error as large as the part of the gap that the diagnosis left unexplained; the "
     "error grows beyond the amplitudes and frequencies of the diagnosed recording. A test should lie within the band "
@@ -28,7 +28,7 @@ def page(found: Prediction, source: str) -> str:
         test=plan.test.name,
         facts=facts,
         sentences=[*tables.verdict(found), *found.sentences],
-        said=SAID,
+        method=METHOD,
         picture=pictures.histories(found),
         peaks=tables.peaks(found),
         limits=tables.limits(found),

@@ -181,9 +181,9 @@ def against_prediction(args: argparse.Namespace) -> int:
             beside.write(path, measured, predicted)
     stream = outputs.aside(args.output, args.html)
     if args.json:
-        from report.prediction import said
+        from report.prediction import sentences
 
-        stream.write(json.dumps(held.plain(found) | {"sentences": said.sentences(found)}) + "\n")
+        stream.write(json.dumps(held.plain(found) | {"sentences": sentences.every(found)}) + "\n")
     else:
         show_held(found, stream)
     return 0 if found.held else 1
@@ -191,7 +191,7 @@ def against_prediction(args: argparse.Namespace) -> int:
 
 def show_held(found: Held, stream: TextIO) -> None:
     """How a recording lay in a prediction, as text."""
-    from report.prediction import said
+    from report.prediction import sentences
     from report.text.terminal import table
 
     rows = [["signal", "inside", "first left", "times left", "farthest", "at"]]
@@ -201,7 +201,7 @@ def show_held(found: Held, stream: TextIO) -> None:
         rows.append([name, f"{100 * one.inside:.0f} %", first, str(len(one.departures)), *far])
     stream.write(f"{found.ticks} ticks in common; the band is of 90 % of the time\n\n")
     table(rows, stream)
-    stream.write("\n" + "".join(f"{shown(text)}\n" for text in said.sentences(found)))
+    stream.write("\n" + "".join(f"{shown(text)}\n" for text in sentences.every(found)))
 
 
 def compare(a: ComparedRun, b: ComparedRun) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from common.roles import MASTER
 from common.terminal import cli
 from loop import substructure
 from loop.of_reality import really, rolled_out
-from report.prediction import overlay, said
+from report.prediction import overlay, sentences
 from rths.__main__ import main
 from rths.prepare.simulate import write as record
 from simulation.prediction import bands, draws, file, held, rest, shape
@@ -153,10 +153,10 @@ def test_a_test_can_be_compared_with_a_predictions_recording(
         measured(folder / f"{name}.mcap", found, **more)
     same = held.held(read(folder / "as_found.mcap"), run)
     assert same.held
-    assert "The prediction held" in said.sentences(same)[0]
+    assert "The prediction held" in sentences.every(same)[0]
     other = held.held(read(folder / "other.mcap"), run)
     assert not other.held
-    told = said.sentences(other)
+    told = sentences.every(other)
     assert "Of the laboratories' readings column_" in told[1]
     assert "of the master was then still within the motion of the diagnosed recording" in told[3]
     assert "peaks lie in their bands; farthest outside: " in told[4]
@@ -212,7 +212,7 @@ def test_a_signal_outside_its_band_is_reported_with_advice(
     wrong = shape.ErrorShape(kind, 0.01, 0.9 if kind else 0.2)
     left = held.Departure(start, start + 1.0, 3.0)
     signal = held.HeldSignal("slave", 0.4, (left,), 3.0, start, "N", 9.0, wrong)
-    told = said.sentences(held.Held(100, {"damper_force": signal}, 0.4, False, figures, False))
+    told = sentences.every(held.Held(100, {"damper_force": signal}, 0.4, False, figures, False))
     assert "40 % of the time was inside its band, instead of 90 %" in told[0]
     assert f"damper_force left its band first, at t = {start:.2f} s" in told[1]
     assert ("No offset, drift" in told[2]) == (not kind)

@@ -27,7 +27,7 @@ from loop.closed_loop import Rollout
 from loop.of_reality import really
 from loop.signals import by_role
 from models.registry import Array
-from report.prediction import said
+from report.prediction import sentences
 from simulation.prediction import bands, draws, file, held
 from simulation.prediction.rest import BEYOND, OUTSIDE
 from simulation.workers.pool import spread
@@ -109,7 +109,7 @@ def predict(work: tuple[FollowingTest, Path], kept: Path | None = None) -> Predi
         after=error(plan, prediction.middle, played.silent, noise),
         inside=came_out.inside,
         closed=closes,
-        said=[*prediction.sentences, *said.sentences(came_out)],
+        said=[*prediction.sentences, *sentences.every(came_out)],
         signals={name: one.inside for name, one in came_out.signals.items()},
         farther={role: one.ratio for role, one in prediction.reaches.items() if one.ratio > BEYOND},
         elsewhere={role: one.outside for role, one in prediction.reaches.items() if one.outside > OUTSIDE},

@@ -15,7 +15,7 @@ SEVERAL = 3  # peaks that a sentence names
 NOISIER = "the sensor is noisier than in the diagnosed recording."
 
 
-def sentences(found: Held) -> list[str]:
+def every(found: Held) -> list[str]:
     """Whether the prediction held, what left its band first and how, what follows, and which peaks held."""
     other = (
         "The test and the prediction have different plans, so a part of what lies outside the band may come from that "
@@ -37,7 +37,7 @@ def verdict(found: Held) -> list[str]:
         least = min(low, key=lambda name: low[name].inside, default="")
         rest = f", for {least} {100 * low[least].inside:.0f} %" if least else ""
         return [f"The prediction held: {share}{rest}."]
-    said = f"The prediction did not hold: {share}, instead of {100 * HELD:.0f} %."
+    failed = f"The prediction did not hold: {share}, instead of {100 * HELD:.0f} %."
     readings = {name: one for name, one in low.items() if is_reading(found, name, one)}
     first = min(
         (one for one in (readings or low).items() if one[1].departures),
@@ -45,8 +45,8 @@ def verdict(found: Held) -> list[str]:
         default=None,
     )
     if first is None:
-        return [said, f"{', '.join(low)} left the band for many short times, as noise does: {NOISIER}"]
-    return [said, *of_first(found, *first)]
+        return [failed, f"{', '.join(low)} left the band for many short times, as noise does: {NOISIER}"]
+    return [failed, *of_first(found, *first)]
 
 
 def is_reading(found: Held, name: str, one: HeldSignal) -> bool:
