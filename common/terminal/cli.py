@@ -153,6 +153,14 @@ def words(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
 
 
+def whole_numbers(text: str) -> list[int]:
+    """A comma-separated list of whole numbers from 0 as the value of an option."""
+    found = words(text)
+    if not found or not all(word.isascii() and word.isdigit() for word in found):
+        raise argparse.ArgumentTypeError(f"'{text}' is no list of whole numbers such as 3 or 3,14")
+    return [int(word) for word in found]
+
+
 def json_argument(parser: argparse.ArgumentParser, text: str) -> None:
     """The option for machine-readable output."""
     parser.add_argument("--json", action="store_true", help=text)

@@ -39,7 +39,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     which.add_argument(
         "--plan", metavar="PLAN", help="the test whose laboratories are diagnosed (default: the default test)"
     )
-    which.add_argument("--cases", type=int, default=300, metavar="N", help="how many (default: 300)")
+    number = which.add_mutually_exclusive_group()
+    number.add_argument("--cases", type=int, default=300, metavar="N", help="how many (default: 300)")
+    number.add_argument(
+        "--case",
+        type=cli.whole_numbers,
+        default=[],
+        metavar="NUMBER,…",
+        help="only the cases of the set with these numbers, as a trial prints them",
+    )
     which.add_argument(
         "--set",
         choices=tuple(SETS),
@@ -89,7 +97,6 @@ def run(args: argparse.Namespace) -> int:
     from simulation.workers.parts import ENDING, parts
     from simulation.workers.parts import write as write_table
     from validation.blind.cases.basis import basis
-    from validation.blind.draw import draw
     from validation.blind.predicted.next_test import next_test
     from validation.blind.predicted.results import measures as of_predictions
     from validation.blind.predicted.results import with_stated
@@ -100,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
 
     check(args)
     trial = basis(plans.load(cli.plan_path(args.plan)), args.duration)
-    cases = draw(args.cases, args.seed, args.set, trial=trial, only=args.only, effects=args.effects)
+    cases = drawn(args, trial)
     about = said_of(args, trial)
     with (
         outputs.folder(args.output, args.force, besides=(f"{TABLE}{ENDING}",)) as folder,
@@ -135,13 +142,23 @@ def run(args: argparse.Namespace) -> int:
     return 1 if any(item.passed is False for item in table) else 0
 
 
+def drawn(args: argparse.Namespace, trial: TrialBasis) -> list[Case]:
+    """The cases asked for."""
+    from validation.blind.draw import draw, numbered
+
+    if args.case:
+        return numbered(args.case, args.seed, args.set, trial=trial)
+    return draw(args.cases, args.seed, args.set, trial=trial, only=args.only, effects=args.effects)
+
+
 def said_of(args: argparse.Namespace, trial: TrialBasis) -> str:
     """One or two sentences on how the cases are made."""
     from validation.blind.library import own_kernels
 
     plan = f"of the plan '{args.plan}', " if args.plan else ""
+    count = f"Case {', '.join(map(str, args.case))}" if args.case else f"{args.cases} cases"
     text = (
-        f"{args.cases} cases {plan}of the set '{args.set}', seed {args.seed}, {args.duration:g} s each, "
+        f"{count} {plan}of the set '{args.set}', seed {args.seed}, {args.duration:g} s each, "
         f"{', '.join(args.only) or 'all kinds'}; diagnosis {args.diagnosis}."
     )
     own = " and ".join(map(title, own_kernels(trial.plan)))
@@ -165,6 +182,8 @@ def check(args: argparse.Namespace) -> None:
     ):
         if not fits:
             raise InputError(f"{name} is {value}, but must be {wanted}.")
+    if args.case and (args.only or args.effects):
+        raise InputError("--case names cases by their numbers: leave out --only and --effects.")
     pool.check(args.jobs, args.dask)
     if args.diagnosis != DIAGNOSIS:
         with tempfile.TemporaryDirectory(prefix="rths-nothing-") as folder:
@@ -212,7 +231,7 @@ def what(args: argparse.Namespace, trial: TrialBasis) -> dict[str, Any]:
     """What the answers of a trial depend on, by names."""
     from simulation.workers.versions import versions
 
-    names = ("cases", "set", "seed", "only", "effects", "duration", "diagnosis", "predict")
+    names = ("cases", "case", "set", "seed", "only", "effects", "duration", "diagnosis", "predict")
     said = {name: getattr(args, name) for name in names}
     return said | {"plan": trial.plan.digest(), "version": versions()}
 

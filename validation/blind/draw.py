@@ -58,6 +58,24 @@ def draw(
     return [drawn(next(asked), trial) for _ in range(count)]
 
 
+def numbered(
+    numbers: Collection[int], seed: int, set_: str, *, trial: TrialBasis | None = None
+) -> list[Case]:
+    """The cases of a set with these numbers, each once and in their order; without a `trial` of the default test.
+
+    Raises:
+        InputError: the set has no case of a number, because the plan has no effect of the kind that was drawn.
+    """
+    trial = trial or basis()
+    begun = [begin(index, seed, set_, trial.library) for index in sorted(set(numbers))]
+    for one in begun:
+        if not exists(one):
+            raise InputError(
+                f"Case {one.index} does not exist: it is of the kind {one.kind}, of which this plan has no effect."
+            )
+    return [drawn(one, trial) for one in begun]
+
+
 @dataclass(frozen=True)
 class Beginning:
     """A case of which only the kind and the names of its effects are drawn yet."""
@@ -75,7 +93,7 @@ def _asked_for(
     while index - last < PATIENCE:
         begun = begin(index, seed, set_, library)
         fits = effects.issuperset(begun.names) if effects else True
-        if begun.kind in kinds and fits and (begun.names or (begun.kind == "clean" and not effects)):
+        if begun.kind in kinds and fits and exists(begun) and (begun.names or not effects):
             last = index
             yield begun
         index += 1
@@ -83,6 +101,11 @@ def _asked_for(
     raise InputError(
         f"There is no case of kind {', '.join(sorted(kinds))} with {wanted}: choose another kind or effect."
     )
+
+
+def exists(begun: Beginning) -> bool:
+    """Whether the plan has such a case: a clean laboratory, or an effect of the kind that was drawn."""
+    return bool(begun.names) or begun.kind == "clean"
 
 
 def begin(index: int, seed: int, set_: str, library: Library) -> Beginning:

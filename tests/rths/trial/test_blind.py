@@ -217,6 +217,22 @@ def test_the_command_scores_the_cases_and_keeps_the_results(
         assert read(folder / "recording.mcap").finished
 
 
+def test_single_cases_of_a_set_are_the_same_as_among_all(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("--set", "tune", "--duration", "1.5", "--json", "--diagnosis", f"{HERE}:no_gap")
+    command("--cases", "3", *words, "-o", str(tmp_path / "all"))
+    last = json.loads(capsys.readouterr().out)["cases"][-1]
+    command("--case", str(last["index"]), *words, "-o", str(tmp_path / "one"))
+    found = json.loads(capsys.readouterr().out)
+    assert found["about"].startswith(f"Case {last['index']} of the set 'tune'")
+    (one,) = found["cases"]
+    changing = ("seconds", "recording")
+    assert {k: v for k, v in one.items() if k not in changing} == {
+        k: v for k, v in last.items() if k not in changing
+    }
+
+
 def test_the_command_passes_where_every_goal_is_met(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -234,6 +250,10 @@ def test_the_command_passes_where_every_goal_is_met(
     ("words", "sentence"),
     [
         (("--cases", "0"), "--cases is 0, but must be at least 1."),
+        (
+            ("--case", "3", "--only", "clean"),
+            "--case names cases by their numbers: leave out --only and --effects.",
+        ),
         (("--jobs", "0"), "--jobs is 0, but must be at least 1, or -1 for all processors."),
         (("--duration", "0"), "--duration is 0.0, but must be between 1 and 600 s."),
         (("--only", "clean,pears"), "Unknown 'pears': did you mean pair?"),

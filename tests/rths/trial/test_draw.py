@@ -32,6 +32,7 @@ from validation.blind.draw import (
     distances,
     draw_parameter,
     drawn,
+    numbered,
     of_catalogue,
 )
 from validation.blind.draw import draw as draw_of
@@ -71,6 +72,19 @@ def test_a_case_does_not_depend_on_the_number_of_cases() -> None:
     few, many = draw(3, 5, "judge"), draw(12, 5, "judge")
     assert many[:3] == few
     assert draw(1, 6, "judge") != few[:1]
+
+
+def test_cases_with_given_numbers_are_those_of_the_set() -> None:
+    every = {case.index: case for case in draw(12, 5, "judge")}
+    assert [case.index for case in every.values()] == list(range(12))
+    assert numbered([7, 2, 7], 5, "judge", trial=TRIAL) == [every[2], every[7]]
+
+
+def test_a_number_of_which_a_plan_has_no_case_is_refused() -> None:
+    trial = replace(TRIAL, library=replace(LIBRARY, strangers={}))
+    missing = next(case.index for case in draw(40, 5, "judge") if case.kind == "unknown")
+    with pytest.raises(InputError, match=rf"Case {missing} does not exist: it is of the kind unknown"):
+        numbered([missing], 5, "judge", trial=trial)
 
 
 def test_the_sets_are_disjoint() -> None:
