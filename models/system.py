@@ -18,6 +18,7 @@ class ActuatorEffects:
 
     velocity_limit: float = math.inf  # m/s
     backlash: float = 0.0  # m, whole play
+    backlash_law: float = 0.0  # 0 behind the loop, between piston and specimen, 1 before the loop
     compliance: float = 0.0  # m/N
     deadband: float = 0.0  # m, whole band of the loop's error without flow
     learned: tuple[float, ...] = ()  # a law of `models.preisach` that adds to the motion, m

@@ -3,7 +3,7 @@
 The actuator is a first-order lag with dead time, whose motion does not depend on the specimen, or servo-hydraulics
 whose force moves the specimen's mass. Effects apply to either: valve overlap removes small errors of the loop, the flow
 of the valve limits the piston's velocity, and oil and frame are compliant under load; the lag may also have play in its
-clevis. A law learned from a recording adds to the motion of the lag.
+clevis or before its loop. A law learned from a recording adds to the motion of the lag.
 """
 
 from __future__ import annotations
@@ -32,11 +32,15 @@ SUBSTEP = 0.25e-3
 FINE_SUBSTEP = 0.05e-3
 SETTLING = 1.0  # s, in which `begin` ramps servo-hydraulics to a command, and in which they then settle
 
-# places in `state`: the lag's piston before compliance and play m, specimen m, load cell N, states of servo-hydraulics
-SERVO, DISPLACEMENT, FORCE, STATES = range(4)
+# places in `state`: the lag's piston before compliance and play m, specimen m, load cell N, command behind a play
+# before the loop m, states of servo-hydraulics
+SERVO, DISPLACEMENT, FORCE, PLAYED, STATES = range(5)
 
 # places in `limits`; for servo-hydraulics GAIN is that of the command, and VELOCITY_LIMIT is given as a flow
-PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, HYDRAULIC, BEYOND = range(10)
+PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, HYDRAULIC, BEYOND, BEFORE = (
+    range(11)
+)
+BEFORE_LOOP = 1.0  # the law of `actuator.backlash` with the play between command and loop
 
 
 class ColumnLab(NamedTuple):
@@ -75,20 +79,28 @@ def build(
         interval, actuator.delay, substeps(interval) if short else 1, held=actuator.command == "held"
     )
     rows = first_order.propagators(actuator.gain, actuator.time_constant, segments.lengths)
-    limits = [float(present), on_actuator.velocity_limit, on_actuator.backlash, on_actuator.compliance]
+    before, behind = plays(on_actuator)
+    limits = [float(present), on_actuator.velocity_limit, behind, on_actuator.compliance]
     limits += [on_actuator.deadband, actuator.gain, column.stiffness, float(actuator.command == "held")]
     law = np.array(on_actuator.learned)
     return ColumnLab(
         segments.taps,
         rows,
         segments.lengths,
-        np.array([*limits, 0.0, 0.0]),
+        np.array([*limits, 0.0, 0.0, before]),
         np.zeros(segments.memory),
         np.zeros(STATES),
         specimen.build(column, on_column),
         law,
         preisach.memory(law),
     )
+
+
+def plays(effects: ActuatorEffects) -> tuple[float, float]:
+    """The whole play (m) before and behind the loop."""
+    if effects.backlash_law == BEFORE_LOOP:
+        return effects.backlash, 0.0
+    return 0.0, effects.backlash
 
 
 def hydraulic(
@@ -119,7 +131,7 @@ def hydraulic(
     held = actuator.command == "held"
     segments = delay.split(interval, servo.delay, steps, held=held)
     limits = [float(limited), on_actuator.velocity_limit * servo.piston, 0.0, on_actuator.compliance]
-    limits += [on_actuator.deadband, servo.gain, column.stiffness, float(held), 1.0, float(beyond)]
+    limits += [on_actuator.deadband, servo.gain, column.stiffness, float(held), 1.0, float(beyond), 0.0]
     return ColumnLab(
         segments.taps,
         servo_hydraulic.propagators(a, b, segments.lengths),
@@ -146,6 +158,7 @@ def begin(lab: ColumnLab, command: float, interval: float) -> None:
             advance(lab, command * min(tick / ticks, 1.0))
         return
     lab.history[:] = command
+    lab.state[PLAYED] = command
     there = lab.limits[GAIN] * command
     lab.state[:FORCE] = there
     lab.state[FORCE] = specimen.force(lab.specimen, there, interval)
@@ -163,22 +176,17 @@ def enter(lab: tuple[Any, ...], command: float) -> tuple[float, float]:
 @jit
 def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
     """Displacement (m) and force (N) one interval later, the command ramped to `command` (m) by then or held."""
-    taps, rows, lengths, limits, history, state = (
-        lab.taps,
-        lab.rows,
-        lab.lengths,
-        lab.limits,
-        lab.history,
-        lab.state,
-    )
-    tested = lab.specimen
-    cell = tested.cell
+    taps, rows, lengths, limits, state = lab.taps, lab.rows, lab.lengths, lab.limits, lab.state
+    history, tested, cell = lab.history, lab.specimen, lab.specimen.cell
     delay.remember(history, command)
     servo, displacement, force = state[SERVO], state[DISPLACEMENT], state[FORCE]
     reached = displacement
-    before = delay.delayed(history, taps, 0)
+    half = 0.5 * limits[BEFORE]
+    before = state[PLAYED] if half > 0.0 else delay.delayed(history, taps, 0)
     for i in range(rows.shape[0]):
         after = delay.delayed(history, taps, i + 1)
+        if half > 0.0:
+            after = min(max(before, after - half), after + half)
         if limits[HELD] != 0.0:
             before = after
         if limits[HYDRAULIC] != 0.0:
@@ -206,6 +214,7 @@ def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
                 reached += preisach.step(lab.learned, lab.learned_memory, displacement, rate)
             force = specimen.force(tested, reached, lengths[i])
         before = after
+    state[PLAYED] = before
     state[SERVO] = servo
     state[DISPLACEMENT] = displacement
     state[FORCE] = force

@@ -67,6 +67,25 @@ def test_the_dead_travel_at_a_reversal_equals_the_play(width: float, compliance:
     assert got[-1] == pytest.approx((1e-3 + width / 2) / (1.0 + compliance * K), rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    "command", [there_and_back(2e-3, 1e-3, 500), tones(400, size=1.5e-3)], ids=["ramps", "tones"]
+)
+def test_play_before_the_loop_holds_back_its_command_and_then_lets_it_settle(command: Array) -> None:
+    """The loop follows a command that stands still at a reversal, rather than that the specimen does."""
+    width, fine = 2e-4, 20
+    actuator = Actuator(gain=0.9, delay=0.0133, time_constant=0.030)
+    got = run_a(command, actuator, actuator_effects=ActuatorEffects(backlash=width, backlash_law=1.0))[:, 0]
+    times = DT / fine * np.arange(1, fine * command.size + 1)
+    played, servo, exact = 0.0, 0.0, []
+    for wanted in map(ramped(command, 0.0133), times):
+        played = min(max(played, wanted - width / 2), wanted + width / 2)
+        servo += (0.9 * played - servo) * -math.expm1(-DT / fine / 0.030)
+        exact.append(servo)
+    behind = run_a(command, actuator, actuator_effects=ActuatorEffects(backlash=width))[:, 0]
+    assert np.max(np.abs(got - behind)) > 0.1 * width  # there is something to be told apart
+    assert np.max(np.abs(got - exact[fine - 1 :: fine])) < 2e-3 * np.max(np.abs(exact))
+
+
 @given(compliance=st.floats(1e-9, 3e-8))
 @settings(max_examples=10)
 def test_a_compliant_piston_deflects_as_in_statics(compliance: float) -> None:

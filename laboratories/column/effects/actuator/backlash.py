@@ -2,14 +2,21 @@
 
     |y_piston − y| ≤ width/2, and y moves only when the play is used up
 
-`width` is the whole play, from one flank to the other. Not to be confused with `column.slip`, where the
-specimen moves but gives no force, or with `actuator.deadband`, which acts on the loop's error.
+`width` is the whole play, from one flank to the other. With `law` 1 it lies before the servo loop, in the linkage or
+the converter by which the loop receives its command:
+
+    T·ẏ = K·r − y,    |u(t − L) − r| ≤ width/2, and r moves only when the play is used up
+
+The loop then approaches a target that stands still; behind the loop the specimen stands still at once at a reversal.
+
+Not to be confused with `column.slip`, where the specimen moves but gives no force, or with `actuator.deadband`, which
+acts on the loop's error and has no memory.
 """
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Parameter
-from laboratories.effects.laws import sets
+from laboratories.effects.effect import Law, Parameter
+from laboratories.effects.laws import sets, which_law
 
 EFFECT = sets(
     "actuator",
@@ -25,7 +32,11 @@ EFFECT = sets(
             says="whole play",
         ),
     },
-    says="play between piston and specimen",
+    further={
+        "backlash_law": which_law(1.0, "0 between piston and specimen, behind the servo loop, 1 before it"),
+    },
+    laws=(Law("behind the loop", {}), Law("before the loop", {})),
+    says="play between piston and specimen, or before the servo loop",
     reference="Nordin, Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38 (2002) 1633-1649",
     actuators=("fopdt",),
 )
