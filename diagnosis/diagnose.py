@@ -13,7 +13,7 @@ from common.errors import InputError
 from common.plan.kinds import COLUMN
 from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import logger, readings, report
+from diagnosis.findings import logger, readings, report, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
 from diagnosis.fits import residuals
@@ -130,6 +130,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
             *reversed_signs(datas),
             *repeating(held),
             *doubted(verdicts),
+            *where.undecided(verdicts),
         ],
         [law for verdict in verdicts if verdict.outcome in UNNAMED for law in learn(verdict.search.chosen)],
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.findings.sites.likely import APART, ranked
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import TOLERANCES
@@ -77,7 +78,9 @@ def judge(search: Search) -> PartVerdict:
         outcome = without_effects(bare)
         return PartVerdict(bare, outcome, 1.0, (), (), doubted=name if outcome == "unknown" else "")
     outcome = how_well(search)
-    if outcome == "unknown" or (outcome == "partly" and (strain(search) < HALF or artefact(search))):
+    if outcome == "unknown" or (
+        outcome == "partly" and (strain(search) < HALF or artefact(search) or misplaced(search))
+    ):
         return unnamed(search)
     chances = odds(search)
     same = [tied(search.chosen, other) for other in search.alternatives]
@@ -179,6 +182,11 @@ def how_well(search: Search) -> Outcome:
     return "partly" if search.explained > HALF else "unknown"
 
 
+def imitated(search: Search) -> bool:
+    """Whether effects that leave something are too doubtful to be named at all."""
+    return strain(search) < HALF or artefact(search) or misplaced(search)
+
+
 def artefact(search: Search) -> bool:
     """Whether nothing but errors of readings is named, and these leave more of the gap than stand-ins leave.
 
@@ -189,6 +197,17 @@ def artefact(search: Search) -> bool:
     kinds = {data.catalogue[name].kind for name in search.chosen.names}
     logged = any(isinstance(item, LoggedReadings) for item in data.part.nuisances)
     return kinds == {"measurement"} and not logged and search.explained < 1.0 - REST
+
+
+def misplaced(search: Search) -> bool:
+    """Whether a single other site explains more of a gap than the effects named, by the readings that it changes.
+
+    An effect changes the readings of its site, so that one that only imitates the cause changes others.
+    """
+    sites = {search.data.catalogue[name].site for name in search.chosen.names}
+    found = ranked(search.commissioned)
+    near = {item.site for item in found if item.cost < APART}
+    return bool(found) and not sites & near and found[0].left < 1.0 - search.explained
 
 
 def allowed(search: Search) -> Array:

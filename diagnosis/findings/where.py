@@ -9,21 +9,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.plan.kinds import COLUMN, TABLE
-from diagnosis.findings.verdict import pinned
+from diagnosis.findings.sites.likely import likely_sites
+from diagnosis.findings.sites.signatures import laboratory_of
+from diagnosis.findings.verdict import PartVerdict, pinned
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.unexplained import gaps
 from diagnosis.fits.worth import SEEN
-from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
+from diagnosis.recorded.parts import ColumnAlone
 from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
 from models.registry import Array
 
-CLEAR = (
-    2.0  # force of a motion over its noise from which on a missing force points to the displacement sensor
-)
 OWN_MOTION = 0.5  # Hz, above which an acceleration is integrated twice: below, sensor drift would dominate
 UNSEEN = 0.5  # motion over the noise of the displacement sensor below which that sensor cannot show it
 # A window belongs to a trace from this share of the trace's largest window on, but never above the second, so that the
@@ -72,7 +70,7 @@ def unexplained(data: Data, fit: Fit) -> SiteTrace:
     left = [item.ratio for item in gaps(fit, data.group)]
     far = pinned(fit)
     # a parameter at its bound that leaves nothing to be seen took the gap upon itself
-    site = far[0].rpartition(".")[0] if far and max(left) < SEEN else culprit(data, residual, left)
+    site = far[0].rpartition(".")[0] if far and max(left) < SEEN else culprits(fit)[0]
     kept = residual[:, int(np.argmax(left))]
     return SiteTrace(
         site,
@@ -83,63 +81,38 @@ def unexplained(data: Data, fit: Fit) -> SiteTrace:
     )
 
 
-def culprit(data: Data, residual: Array, left: Sequence[float]) -> str:
-    """The site from which residuals (ticks, signals) in σ most likely come, judged by which signals show them."""
-    part = data.part
-    if not isinstance(part, LaboratoryPart):
-        return part.lab.site(part.name) if isinstance(part, ColumnAlone) else part.name
-    amount = dict(zip(part.lab.kind.channels.names, left, strict=True))
-    culprits = {TABLE: culprit_b, COLUMN: culprit_a}
-    return part.lab.site(culprits.get(part.lab.kind.name, culprit_of_device)(data, residual, amount))
+def culprits(fit: Fit) -> tuple[str, ...]:
+    """The sites from which what a fit leaves may come, the likeliest first; several where no reading tells them apart.
+
+    What the accelerometer of a table alone feels may be a rocking of the table, as long as no displacement as large
+    as the one behind it would be seen.
+    """
+    part = laboratory_of(fit.data.part)
+    if part is None:
+        alone = fit.data.part
+        return (alone.lab.site(alone.name) if isinstance(alone, ColumnAlone) else alone.name,)
+    found = likely_sites(fit) or (part.lab.site(part.lab.kind.sites[0]),)
+    accelerometer = part.lab.site("sensor.table_acceleration")
+    if found[0] == accelerometer and hidden_in_displacement(fit):
+        return tuple(dict.fromkeys((part.lab.site("table"), *found)))
+    return found
 
 
-def culprit_of_device(data: Data, _residual: Array, amount: dict[str, float]) -> str:
-    """The site in a laboratory of a user's kind: its device, since nothing is known of what each signal shows."""
-    part = data.part
-    return part.lab.kind.sites[0] if isinstance(part, LaboratoryPart) else next(iter(amount))
+def undecided(verdicts: Sequence[PartVerdict]) -> list[str]:
+    """A sentence for each unknown effect that may lie at several sites."""
+    found = [culprits(item.search.chosen) for item in verdicts if item.outcome == "unknown"]
+    return [
+        f"What no effect explains may arise at {' or at '.join(sites)}: these signals cannot tell them apart."
+        for sites in found
+        if len(sites) > 1
+    ]
 
 
-def culprit_a(data: Data, residual: Array, amount: dict[str, float]) -> str:
-    """A column under an actuator: the actuator moves displacement and force together, the column the force alone."""
-    displacement, force = amount["column_displacement"], amount["column_force"]
-    if not data.part.present[:, 1].any():
-        return "actuator"
-    stiffness = data.system.plan.column.stiffness
-    implied = (
-        stiffness * residual[:, 0] * data.sigma[0] / data.sigma[1]
-    )  # force that a true motion would make
-    level = math.sqrt(float(np.mean(implied**2)))
-    if displacement < SEEN:
-        return "column"
-    with_it = residual[:, 1] - implied
-    alone = math.sqrt(
-        max(float(np.mean(with_it**2)) - 1.0 - (stiffness * data.sigma[0] / data.sigma[1]) ** 2, 0.0)
-    )
-    if force < SEEN and level > CLEAR:
-        return "sensor.column_displacement"
-    return "actuator" if alone < max(force, displacement) else "column"
-
-
-def culprit_b(data: Data, residual: Array, amount: dict[str, float]) -> str:
-    """A damper on a table: the table moves all readings, the damper stroke and force; a single one is a sensor's."""
-    seen = {name for name, value in amount.items() if value > SEEN}
-    if "table_displacement" in seen:
-        return "table"
-    if seen == {"table_acceleration"}:
-        return "table" if hidden_in_displacement(data, residual) else "sensor.table_acceleration"
-    if seen == {
-        "damper_force"
-    }:  # a true force would have moved the mass, which the stroke shows far more clearly
-        return "sensor.damper_force" if data.part.present[:, 2].any() else "damper"
-    table = amount.get("table_acceleration", 0.0)
-    damper = max(amount.get("damper_stroke", 0.0), amount.get("damper_force", 0.0))
-    return "table" if table > damper else "damper"
-
-
-def hidden_in_displacement(data: Data, residual: Array) -> bool:
+def hidden_in_displacement(fit: Fit) -> bool:
     """Whether the motion behind an acceleration's residual is too small for the displacement sensor to show."""
+    data = fit.data
     interval = data.system.plan.test.interval
-    series = residual[:, 1] * data.sigma[1]
+    series = data.residual(hypothesis.lay(data, fit.z, fit.values))[:, 1]
     spectrum = np.fft.rfft(series)
     omega = 2.0 * np.pi * np.fft.rfftfreq(series.size, interval)
     fast = omega > 2.0 * np.pi * OWN_MOTION

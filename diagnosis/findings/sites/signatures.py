@@ -1,0 +1,98 @@
+"""How all readings of a laboratory follow from one unknown motion or force at a site.
+
+A machine's effect changes its motion, and with it every reading downstream; an error of a reading changes that alone.
+Laplace variable s, displacements of the transfer system x, stroke y relative to the table, m·s² and so on of the plan.
+
+Table:    x, s²·x, y = −m·s²·x/(m·s² + c·s + k), force (k + c·s)·y
+Damper:   y, force −m·s²·y by a force within the damper, (k + c·s)·y by what its mass carries along
+Actuator: x, force (m·s² + c·s + k)·x;  column: force alone
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.plan.kinds import COLUMN, TABLE
+from diagnosis.recorded.joined import JoinedPart
+from diagnosis.recorded.laboratory import RecordedLaboratory
+from diagnosis.recorded.parts import LaboratoryPart, Part
+from models.registry import Array
+from models.system import System
+
+Spectrum = NDArray[np.complex128]
+
+
+class Signature(NamedTuple):
+    """The readings by one unknown series at a site, frequency by frequency."""
+
+    site: str
+    readings: Spectrum  # (frequencies, signals)
+
+
+def laboratory_of(part: Part) -> LaboratoryPart | None:
+    """The laboratory of a part, of the first recording where it is that of several; None of other parts."""
+    first = part.pieces[0] if isinstance(part, JoinedPart) else part
+    return first if isinstance(first, LaboratoryPart) else None
+
+
+def signatures(part: LaboratoryPart, system: System, frequencies: Array) -> list[Signature]:
+    """The signatures of the sites of a laboratory, machines first; none of a kind of the user's.
+
+    A site has several where several kinds of effects at it differ.
+    """
+    kinds = {TABLE: of_table, COLUMN: of_column}
+    if part.lab.kind.name not in kinds:
+        return []
+    lab: RecordedLaboratory = part.lab
+    find: Callable[[System, Spectrum], list[tuple[str, list[Spectrum]]]] = kinds[lab.kind.name]
+    s: Spectrum = np.asarray(2j * np.pi * frequencies, dtype=np.complex128)
+    recorded = passed(part, frequencies)
+    machines = [
+        Signature(lab.site(site), np.stack(rows, axis=1) * recorded) for site, rows in find(system, s)
+    ]
+    one = np.eye(recorded.shape[1])
+    sensors = [
+        Signature(lab.site(f"sensor.{name}"), np.broadcast_to(row, recorded.shape).astype(np.complex128))
+        for name, row in zip(lab.kind.channels.names, one, strict=True)
+    ]
+    return [*machines, *sensors]
+
+
+def of_table(system: System, s: Spectrum) -> list[tuple[str, list[Spectrum]]]:
+    """A damper on a table: displacement and acceleration of the table, stroke and force of the damper."""
+    damper, none, one = system.plan.damper, np.zeros_like(s), np.ones_like(s)
+    inertia = damper.mass * s**2
+    spring = damper.stiffness + damper.damping * s
+    moving = inertia + spring
+    return [
+        ("table", [moving, s**2 * moving, -inertia, -inertia * spring]),
+        ("damper", [none, none, one, -inertia]),
+        ("damper", [none, none, one, spring]),
+    ]
+
+
+def of_column(system: System, s: Spectrum) -> list[tuple[str, list[Spectrum]]]:
+    """A column under an actuator: displacement and force."""
+    column, one = system.plan.column, np.ones_like(s)
+    return [
+        ("actuator", [one, column.mass * s**2 + column.damping * s + column.stiffness]),
+        ("column", [0.0 * one, one]),
+    ]
+
+
+def passed(part: LaboratoryPart, frequencies: Array) -> Spectrum:
+    """What the filters and delays stated for the recording's channels do to the readings, (frequencies, signals)."""
+    result = np.ones((frequencies.size, len(part.signals)), dtype=np.complex128)
+    interval = part.lab.plan.test.interval
+    for place, channel in enumerate(part.channels):
+        if channel.filter is not None or channel.delay != 0.0:
+            impulse = np.zeros(len(part.measured))
+            impulse[0] = 1.0
+            response = np.fft.rfft(channel.through(impulse, interval))
+            lines = np.fft.rfftfreq(impulse.size, interval)
+            result[:, place] = np.interp(frequencies, lines, response)
+    return result

@@ -1,0 +1,122 @@
+"""The site of an unknown effect, by the readings that it changes; names at sites that it cannot have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.findings import where
+from diagnosis.findings.sites.likely import likely_sites, ranked
+from diagnosis.findings.verdict import judge, misplaced
+from diagnosis.fits import fitting, residuals
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.residuals import Data
+from diagnosis.fits.search import Search
+from diagnosis.recorded.parts import Building, LaboratoryPart
+from laboratories.effects import CATALOGUE, checked, lay
+from models.registry import Array
+from tests.diagnosis.cases import Cases, lab_a, lab_b, white
+
+SECONDS = 8.0
+
+
+def softer(values: Array) -> Array:
+    """Values that are smaller the larger they are, by a fifth at most."""
+    return values * (1.0 - 0.2 * (values / np.max(np.abs(values))) ** 2)
+
+
+def commanded(part: LaboratoryPart, number: int, change: Callable[[Array], Array]) -> LaboratoryPart:
+    """The laboratory that received another command than the recorded one, as by an unknown effect of its machine."""
+    name = list(part.inputs)[number]
+    return part.replaced(inputs=part.inputs | {name: change(part.inputs[name])})
+
+
+def ripple(values: Array) -> Array:
+    """Values with a sine of 9 Hz, as of a pump."""
+    return values + 2e-4 * np.sin(2.0 * np.pi * 9.0 * 2e-3 * np.arange(values.size))
+
+
+def judged(part: LaboratoryPart, data: Data, truth: Array) -> Fit:
+    """The fit without effects of readings that are `truth` (ticks, signals) with noise."""
+    part.measured = truth + data.white * white(7, *truth.shape)
+    return fitting.fit(data, {})
+
+
+MACHINES: dict[str, tuple[str, int, Callable[[Array], Array]]] = {
+    "an actuator's gain that depends on amplitude": ("actuator", 0, softer),
+    "a ripple of an actuator's supply": ("actuator", 0, ripple),
+    "a table's gain that depends on amplitude": ("table", 0, softer),
+    "a ripple of a table's supply": ("table", 0, ripple),
+    "a motor's constant that depends on the command": ("damper", 1, softer),
+}
+
+
+@pytest.mark.parametrize("what", MACHINES)
+def test_an_unknown_effect_of_a_machine_changes_the_readings_downstream(cases: Cases, what: str) -> None:
+    site, number, change = MACHINES[what]
+    whole = cases.record(duration=SECONDS)
+    part = (lab_a if site == "actuator" else lab_b)(whole)
+    data = residuals.prepare(part, whole)
+    fit = judged(part, data, commanded(part, number, change).predict(data.system))
+    assert likely_sites(fit) == (site,)
+
+
+@pytest.mark.parametrize(
+    "name", ["sensor.table_displacement", "sensor.table_acceleration", "sensor.damper_force"]
+)
+def test_an_unknown_error_of_a_reading_changes_that_alone(cases: Cases, name: str) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_b(whole)
+    data = residuals.prepare(part, whole)
+    truth = part.predict(data.system)
+    place = part.signals.index(name.removeprefix("sensor."))
+    truth[:, place] = softer(truth[:, place])
+    fit = judged(part, data, truth)
+    assert likely_sites(fit) == (name,)
+    assert where.culprits(fit)[0] == name
+
+
+def test_what_the_mass_of_a_damper_carries_along_lies_at_the_damper(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_b(whole)
+    data = residuals.prepare(part, whole)
+    heavier = lay(data.system, (("damper.mass", checked(CATALOGUE["damper.mass"], {"factor": 1.2})),))
+    assert likely_sites(judged(part, data, part.predict(heavier)))[0] == "damper"
+
+
+def test_a_column_and_the_load_cell_behind_it_cannot_be_told_apart(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_a(whole)
+    data = residuals.prepare(part, whole)
+    truth = part.predict(data.system)
+    truth[:, 1] = softer(truth[:, 1])
+    fit = judged(part, data, truth)
+    assert likely_sites(fit) == ("column", "sensor.column_force")
+    verdict = judge(Search(data, fit, fit, ()))
+    assert where.undecided([verdict]) == [
+        "What no effect explains may arise at column or at sensor.column_force: these signals cannot tell them apart."
+    ]
+
+
+def test_effects_elsewhere_that_explain_less_than_an_unknown_one_are_not_named(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_a(whole)
+    data = residuals.prepare(part, whole)
+    bare = judged(part, data, commanded(part, 0, softer).predict(data.system))
+    limited = {"sensor.column_displacement.gain": {"factor": 0.95}}
+    found = Search(data, bare, fitting.fit(data, limited, bare.z), ())
+    assert misplaced(found)
+    assert not misplaced(
+        replace(found, chosen=fitting.fit(data, {"actuator.gain": {"factor": 0.95}}, bare.z))
+    )
+
+
+def test_a_building_has_no_likely_sites(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    data = residuals.prepare(Building(whole), whole)
+    fit = fitting.at(data, {}, np.zeros(len(data.part.nuisances)))
+    assert ranked(fit) == []
+    assert where.culprits(fit) == ("structure",)
