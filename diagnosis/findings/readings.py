@@ -83,15 +83,31 @@ def resolutions(record: Record, rounded: dict[str, float]) -> dict[str, float]:
 
 
 def held(record: Record, rounded: dict[str, float]) -> dict[str, float]:
-    """Share of samples exactly equal to the one before, by sensor; only of sensors whose noise rules that out."""
-    found = {}
+    """Share of samples exactly equal to the one before, by sensor; only of sensors whose noise rules that out.
+
+    A channel that was interpolated onto the ticks has the equal samples of a rounded one, but no step.
+    """
+    found, between = {}, interpolated(record)
     for name in read_by(record):
-        if record.has(name) and name not in rounded and np.ptp(record.signals[name]) > 0.0:
+        if name in rounded or name in between:
+            continue
+        if record.has(name) and np.ptp(record.signals[name]) > 0.0:
             there = record.signals[name][record.present[name]]
             share = float(np.mean(there[1:] == there[:-1]))
             if REPEATED < share < STOOD and not printed(there):
                 found[name] = share
     return found
+
+
+def interpolated(record: Record) -> set[str]:
+    """The readings whose rows were not on the ticks when they were imported."""
+    stated = record.stated
+    return {
+        given
+        for lab in record.labs
+        for name, given in zip(lab.kind.channels.names, lab.measured, strict=True)
+        if stated is not None and stated.channel(lab.role, name).interpolated
+    }
 
 
 def printed(values: Array) -> bool:

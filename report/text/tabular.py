@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
+from report.text.text_form import UNSTATED, StatedForm, TextForm, is_number, recognised
 
 Columns = dict[str, NDArray[np.float64]]
 
@@ -20,27 +21,12 @@ WRITABLE = (".csv", ".parquet", ".mat")
 MAT_NAME = 63  # characters that MATLAB allows
 
 
-class TextForm(NamedTuple):
-    """The form of a table in a text file."""
-
-    separator: str = ""  # empty: a comma, a semicolon where that is the decimal sign, a tab in .tsv
-    decimal: str = "."
-    skip_rows: int = 0  # before that of the names
-
-    def between(self, path: Path) -> str:
-        """The character between columns."""
-        usual = "\t" if path.suffix.lower() == ".tsv" else ";" if self.decimal == "," else ","
-        return self.separator or usual
-
-
 class DataTable(NamedTuple):
     """The columns of a file."""
 
     columns: Columns
     units: dict[str, str]  # of the columns that have a unit in a row below the names
-
-
-AS_WRITTEN = TextForm()
+    form: TextForm | None = None  # of a text file
 
 
 def read(path: Path) -> Columns:
@@ -48,8 +34,10 @@ def read(path: Path) -> Columns:
     return read_table(path).columns
 
 
-def read_table(path: Path, form: TextForm = AS_WRITTEN) -> DataTable:
+def read_table(path: Path, form: StatedForm = UNSTATED) -> DataTable:
     """Numeric columns by name, with units where a text file has a row of them below the names.
+
+    What the `form` of a text file leaves open is recognised.
 
     Raises:
         InputError: the file cannot be read, holds no numbers, or is no text file although `form` is that of one.
@@ -60,7 +48,7 @@ def read_table(path: Path, form: TextForm = AS_WRITTEN) -> DataTable:
         raise InputError(f"The format of {path} is unknown: give a file that ends in {', '.join(READABLE)}.")
     if not path.is_file():
         raise InputError(f"There is no file {path}.")
-    if suffix in readers and form != AS_WRITTEN:
+    if suffix in readers and form._replace(columns=()) != UNSTATED:
         raise InputError(f"{path} is no text: leave out separator, decimal and skip_rows.")
     hint = "" if suffix in readers else "; a map can give its separator, decimal sign and rows to skip"
     try:
@@ -72,22 +60,23 @@ def read_table(path: Path, form: TextForm = AS_WRITTEN) -> DataTable:
     return found
 
 
-def _read_text(path: Path, form: TextForm) -> DataTable:
+def _read_text(path: Path, stated: StatedForm) -> DataTable:
     """A text file in UTF-8, or in Latin-1 as older loggers write it."""
     from pyarrow import csv as arrow
 
     encoding = _encoding(path)
+    form = recognised(path, encoding, stated)
     units = _units(path, form, encoding)
     table = arrow.read_csv(
         path,
         arrow.ReadOptions(
             skip_rows=form.skip_rows, skip_rows_after_names=1 if units else 0, encoding=encoding
         ),
-        arrow.ParseOptions(delimiter=form.between(path)),
+        arrow.ParseOptions(delimiter=form.separator),
         arrow.ConvertOptions(decimal_point=form.decimal),
     )
     columns = _numeric(table)
-    return DataTable(columns, {name: unit for name, unit in units.items() if name in columns and unit})
+    return DataTable(columns, {name: unit for name, unit in units.items() if name in columns and unit}, form)
 
 
 def _encoding(path: Path) -> str:
@@ -104,20 +93,12 @@ def _units(path: Path, form: TextForm, encoding: str) -> dict[str, str]:
     """The row below the names where it holds texts and no number, by name: a row of units; empty where it is data."""
     with path.open(encoding=f"{encoding}-sig" if encoding == "utf-8" else encoding, newline="") as stream:
         text = "".join(itertools.islice(stream, form.skip_rows, form.skip_rows + 2))
-    rows = list(csv.reader(io.StringIO(text), delimiter=form.between(path)))
+    rows = list(csv.reader(io.StringIO(text), delimiter=form.separator))
     if len(rows) < 2 or not any(cell.strip() for cell in rows[1]):
         return {}
-    if any(_is_number(cell, form.decimal) for cell in rows[1]):
+    if any(is_number(cell, form.decimal) for cell in rows[1]):
         return {}
     return {name.strip(): unit.strip().strip("[]()") for name, unit in zip(*rows, strict=False)}
-
-
-def _is_number(cell: str, decimal: str) -> bool:
-    try:
-        float(cell.replace(decimal, "."))
-    except ValueError:
-        return False
-    return True
 
 
 def _read_parquet(path: Path) -> Columns:
@@ -129,11 +110,11 @@ def _read_parquet(path: Path) -> Columns:
 def _numeric(table: Any) -> Columns:
     import pyarrow as pa
 
-    columns = {}
-    for name in table.column_names:
-        kind = table.schema.field(name).type
-        if pa.types.is_integer(kind) or pa.types.is_floating(kind):
-            columns[name.strip()] = np.array(table[name].to_numpy(), dtype=np.float64)
+    columns: Columns = {}
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        numeric = pa.types.is_integer(column.type) or pa.types.is_floating(column.type)
+        if numeric and name.strip():  # a column without a name cannot be asked for
+            columns[name.strip()] = np.array(column.to_numpy(), dtype=np.float64)
     return columns
 
 

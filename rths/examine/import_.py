@@ -15,6 +15,7 @@ from common.roles import LATENCY, MASTER, kind_of
 from common.signals import Signal
 from common.terminal import cli, outputs
 from report.text.progress import Progress
+from report.text.text_form import TextForm
 
 if TYPE_CHECKING:
     from rths.examine.import_map import ImportMap, Known
@@ -53,19 +54,18 @@ def run(args: argparse.Namespace) -> int:
         from rths.examine.onto_ticks import on_ticks
 
         mapping = load_map(args.map)
-        table = mapping.table
-        form = tabular.TextForm(table.separator, table.decimal, table.skip_rows)
-        found = on_ticks(mapping, tabular.read_table(args.data, form), args.data)
+        table = tabular.read_table(args.data, mapping.form)
+        found = on_ticks(mapping, table, args.data)
         with outputs.writing(args.output, args.force, inputs) as path:
             write(path, mapping, found, args.data.name, as_is=args.as_is)
             if not args.as_is:
                 check_slips(path, args.data)
-    show(args, mapping, found)
+    show(args, mapping, found, table.form)
     return 0
 
 
-def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks) -> None:
-    """Say what was written, which signals are absent or interpolated, and whether the link can be judged."""
+def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: TextForm | None) -> None:
+    """Say what was written and read, which signals are absent or interpolated, and whether the link can be judged."""
     from rths.examine.import_map import lab_signals
 
     known, present = lab_signals(mapping.plan), list(found.values)
@@ -78,12 +78,18 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks) -> None:
             "interpolated": found.interpolated,
             "link": "judged" if judged else UNJUDGED,
             "units": found.units,
+            "text": form and form._asdict(),
         }
         say(json.dumps(report) + "\n")
         return
     interval = mapping.plan.test.interval
     say(f"{args.output}: {found.t.size} ticks of {interval:g} s; signals: {', '.join(present)}\n")
     say(f"absent: {', '.join(absent) or 'none'}\n")
+    if form and form != TextForm():
+        between = "tabs" if form.separator == "\t" else f"'{form.separator}'"
+        say(
+            f"text: {between} between columns, decimal sign '{form.decimal}', {form.skip_rows} rows above the names\n"
+        )
     if found.units:
         rows = (f"{name} in {unit}" for name, unit in found.units.items())
         say(f"units, from the row below the names: {', '.join(rows)}\n")

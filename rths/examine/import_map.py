@@ -17,6 +17,7 @@ from common.plan.units import converted
 from common.recording.imported import FILTERS, LoggerFilter
 from common.roles import MASTER, latency_topic, name_of
 from common.signals import FieldType, Signal
+from report.text.text_form import StatedForm
 
 Known = dict[str, tuple[str, Signal]]  # by our name of a signal its topic and its row there
 GIVEN = (FieldType.NUMBER, FieldType.STOREYS, FieldType.INDEX)
@@ -79,6 +80,7 @@ class SignalSource:
 
 
 APART = ("value", "filter", "resolution")  # keys that need their own check
+FORM = ("separator", "decimal", "skip_rows")  # keys of a text file, recognised where they are left out
 OUR_OWN = ("scaled",)  # fields that are set here and cannot be given as keys
 
 
@@ -105,6 +107,7 @@ class ImportMap:
     plan: Plan
     table: ImportTable
     signals: dict[str, SignalSource]
+    form: StatedForm  # of a text file
     start: float | None  # s, in the data's own time
     stop: float | None
 
@@ -143,13 +146,17 @@ def load_map(path: Path) -> ImportMap:
     except PlanError as error:
         raise InputError(f"{path}: {str(error).replace(' in [map]', '')}") from None
     start, stop = (getattr(table, name) if name in tables else None for name in ("start", "stop"))
+    form = StatedForm(**{name: tables[name] for name in FORM if name in tables})
     check(path, table, start, stop)
+    check_form(path, form)
     plan = plans.load(path.parent / table.plan)
     known = lab_signals(plan)
     sources = {name: source(path, name, entry, known) for name, entry in rows.items()}
     for name in sources:
         check_single(path, plan, name, known)
-    return ImportMap(path, plan, table, sources, start, stop)
+    sought = (table.time, *(one.column for one in sources.values()))
+    form = form._replace(columns=tuple(name for name in sought if name))
+    return ImportMap(path, plan, table, sources, form, start, stop)
 
 
 def check(path: Path, table: ImportTable, start: float | None, stop: float | None) -> None:
@@ -158,10 +165,14 @@ def check(path: Path, table: ImportTable, start: float | None, stop: float | Non
         raise InputError(f'{path}: start and stop are times: give time = "name of the time column" too.')
     if start is not None and stop is not None and not stop > start:
         raise InputError(f"{path}: stop is {stop:g} s, but must be after start, which is {start:g} s.")
-    if len(table.separator) > 1:
-        raise InputError(f"{path}: separator is {table.separator!r}, but must be one character.")
-    if table.separator == table.decimal:
-        raise InputError(f"{path}: separator and decimal are both {table.decimal!r}: give each its own.")
+
+
+def check_form(path: Path, form: StatedForm) -> None:
+    """Raise InputError for a form that no text has."""
+    if form.separator is not None and len(form.separator) != 1:
+        raise InputError(f"{path}: separator is {form.separator!r}, but must be one character.")
+    if form.separator is not None and form.separator == form.decimal:
+        raise InputError(f"{path}: separator and decimal are both {form.decimal!r}: give each its own.")
 
 
 def check_single(path: Path, plan: Plan, name: str, known: Known) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from common.errors import InputError, PlanError
 from common.plan.schema import nearest
@@ -68,18 +69,23 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path) -> OnTicks:
         scale, unit = scale_of(name, source, row, table, data)
         if unit:
             found.units[name] = unit
-        found.values[name] = moved(theirs, scale * column + source.offset, t, row)
+        values = scale * column + source.offset
+        found.values[name] = moved(theirs, values, t, row) if between else values[nearest_rows(theirs, t)]
         found.stated[name] = channel(source, row, rate, between=between)
     return found
 
 
 def stands_on(theirs: Array, t: Array, interval: float) -> bool:
     """Whether every tick has a row of its own."""
-    after = np.clip(np.searchsorted(theirs, t), 1, max(theirs.size - 1, 1))
-    if theirs.size < 2:
-        return True
-    nearest_row = np.minimum(np.abs(theirs[after] - t), np.abs(theirs[after - 1] - t))
-    return bool(np.max(nearest_row, initial=0.0) <= ON_TICKS * interval)
+    away = np.abs(theirs[nearest_rows(theirs, t)] - t)
+    return bool(np.max(away, initial=0.0) <= ON_TICKS * interval)
+
+
+def nearest_rows(theirs: Array, t: Array) -> npt.NDArray[np.intp]:
+    """The row nearest to each tick."""
+    after = np.clip(np.searchsorted(theirs, t), min(1, theirs.size - 1), theirs.size - 1)
+    before = np.maximum(after - 1, 0)
+    return np.where(np.abs(theirs[after] - t) < np.abs(theirs[before] - t), after, before)
 
 
 def moved(theirs: Array, values: Array, t: Array, row: Signal) -> Array:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from common.recording.imported import IMPORT, ImportedChannel, ImportedData
 from common.recording.reader import read
+from common.roles import MASTER
 from diagnosis.findings import readings
 from diagnosis.findings.readings import SensorFinding
 from diagnosis.fits import residuals
@@ -103,3 +107,14 @@ def test_noise_and_rounding_are_in_the_report(cases: Cases) -> None:
     assert [site["site"] for site in report["where"]] == ["sensor.column_force"]
     rounded = cases.report({"sensor.damper_force.quantization": {"step": 2.0}}, duration=8.0)
     assert named(rounded) == ["sensor.damper_force.quantization"]
+
+
+def test_an_interpolated_channel_does_not_count_as_one_that_misses_samples(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    values = whole.signals["column_force"].copy()
+    values[1::50] = values[::50]
+    held = replace(whole, signals=whole.signals | {"column_force": values})
+    assert readings.held(held, {}) == {"column_force": pytest.approx(0.02, rel=0.1)}
+    between = ImportedData("a.csv", False, {MASTER: {"column_force": ImportedChannel(interpolated=True)}})
+    logged = replace(held, run=replace(held.run, metadata=held.run.metadata | {IMPORT: between.metadata()}))
+    assert readings.held(logged, {}) == {}

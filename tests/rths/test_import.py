@@ -12,6 +12,8 @@ import pytest
 from common.recording.imported import ImportedData, LoggerFilter, imported
 from common.recording.reader import read
 from common.recording.run import Run
+from report.text.tabular import read_table
+from report.text.text_form import StatedForm, TextForm
 
 PLAN = '[test]\ninterval = 0.01\nduration = 1.0\n[compensator]\nkind = "none"\n'
 TIMES = 0.01 * np.arange(400)
@@ -94,12 +96,47 @@ def test_files_with_semicolons_decimal_commas_a_preamble_and_a_row_of_units_are_
         "t;u;y", TIMES, COMMAND, LATE, between=";", decimal=",", below="s;mm;mm", above="Logger Müller"
     )
     rows = 'actuator_command = { column = "u" }\ncolumn_displacement = { column = "y" }\n'
-    code, run = bring(text, rows, 'time = "t"\nseparator = ";"\ndecimal = ","\nskip_rows = 1\n')
-    assert code == 0
-    assert np.allclose(run.columns["master"]["column_displacement"], 1e-3 * LATE, atol=1e-11)
-    assert "units, from the row below the names: actuator_command in mm" in capsys.readouterr().out
-    assert bring(text.partition("\n")[2], rows)[0] == 2
+    stated = 'time = "t"\nseparator = ";"\ndecimal = ","\nskip_rows = 1\n'
+    for top in (stated, 'time = "t"\n'):  # what a map leaves out is recognised
+        code, run = bring(text, rows, top)
+        assert code == 0
+        assert np.allclose(run.columns["master"]["column_displacement"], 1e-3 * LATE, atol=1e-11)
+        said = capsys.readouterr().out
+        assert "text: ';' between columns, decimal sign ',', 1 rows above the names" in said
+        assert "units, from the row below the names: actuator_command in mm" in said
+    assert bring(text, rows, 'time = "t"\nseparator = ","\n')[0] == 2
     assert "a map can give its separator, decimal sign and rows to skip" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "form", "columns"),
+    [
+        ("t,u\n0,1\n1,2\n2,3\n", TextForm(), ["t", "u"]),
+        ("t;u\n0,0;1,5\n0,1;2\n0,2;3,5\n", TextForm(";", ","), ["t", "u"]),
+        ("t;u\n0.0;1.5\n0.1;2.5\n", TextForm(";"), ["t", "u"]),
+        ("t\tu\n(s)\t(mm)\n0.0\t1.5\n0.1\t2.5\n", TextForm("\t"), ["t", "u"]),
+        ("Run;7;;\nDate;1.2.2024;;\nt;u;;\ns;mm;;\n0;1,5;;\n1;2,5;;\n", TextForm(";", ",", 2), ["t", "u"]),
+        ("Bench,A\nt,u\n0,1\n1,2\n", TextForm(skip_rows=1), ["t", "u"]),  # by the names that are looked for
+        ("t,u\n0,\n1,2\n2,\n", TextForm(), ["t", "u"]),
+    ],
+)
+def test_the_form_of_a_text_file_is_recognised(
+    text: str, form: TextForm, columns: list[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "data.txt"
+    path.write_text(text)
+    found = read_table(path, StatedForm(columns=("t",)))
+    assert found.form == form
+    assert list(found.columns)[:2] == columns
+
+
+def test_rows_on_the_ticks_keep_their_steps_although_times_are_not_exact(bring: Any) -> None:
+    times = TIMES + 12.34567  # whose differences are no whole multiples of an interval
+    steps = np.round(COMMAND, 1)
+    code, run = bring(table("t,u,y", times, steps, steps), DRIVE)
+    assert code == 0
+    assert not known(run).channel("master", "column_displacement").interpolated
+    assert set(np.unique(run.columns["master"]["column_displacement"])) == set(np.unique(1e-3 * steps))
 
 
 def test_start_and_stop_select_a_part_of_the_data(bring: Any) -> None:

@@ -1,0 +1,110 @@
+"""The form of a table in a text file: its separator, its decimal sign, and the rows above the names."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+SEPARATORS = (",", ";", "\t")
+DECIMALS = (".", ",")
+LOOKED_AT = 200  # rows in which a form is recognised: a preamble of a logger has some tens
+
+Rows = list[list[str]]
+
+
+class TextForm(NamedTuple):
+    """The form of a table in a text file."""
+
+    separator: str = ","
+    decimal: str = "."
+    skip_rows: int = 0  # before that of the names
+
+
+class StatedForm(NamedTuple):
+    """What is known of the form of a text file beforehand; None is recognised in the file."""
+
+    separator: str | None = None
+    decimal: str | None = None
+    skip_rows: int | None = None
+    columns: tuple[str, ...] = ()  # names of columns that are looked for
+
+
+UNSTATED = StatedForm()
+
+
+def recognised(path: Path, encoding: str, stated: StatedForm) -> TextForm:
+    """The form in which most of a file's columns hold numbers; of equals a comma with a decimal point first."""
+    with path.open(encoding=encoding, newline="") as stream:
+        lines = list(itertools.islice(stream, LOOKED_AT))
+    forms = [
+        TextForm(separator, decimal)
+        for separator in ([stated.separator] if stated.separator else SEPARATORS)
+        for decimal in ([stated.decimal] if stated.decimal else DECIMALS)
+        if separator != decimal
+    ]
+    tried = [(form, split(lines, form.separator)) for form in forms]
+    form, rows = max(tried, key=lambda one: numeric_columns(one[1], one[0].decimal))
+    skipped = names_row(rows, form.decimal, stated.columns) if stated.skip_rows is None else stated.skip_rows
+    return form._replace(skip_rows=skipped)
+
+
+def split(lines: Sequence[str], separator: str) -> Rows:
+    """The cells of each line."""
+    return list(csv.reader(io.StringIO("".join(lines)), delimiter=separator))
+
+
+def numeric_columns(rows: Rows, decimal: str) -> int:
+    """How many more columns hold numbers than other texts in the last quarter of the rows; empty ones do not count.
+
+    A wrong separator cuts numbers in two, and leaves texts of several beside them.
+    """
+    body = [row for row in rows[3 * len(rows) // 4 :] if row]
+    width = len(body[0]) if body else 0
+    if any(len(row) != width for row in body):
+        return -1
+    filled = [[cell for cell in column if cell.strip()] for column in zip(*body, strict=True)]
+    numeric = [all(is_number(cell, decimal) for cell in column) for column in filled if column]
+    return 2 * sum(numeric) - len(numeric)
+
+
+def names_row(rows: Rows, decimal: str, columns: Sequence[str]) -> int:
+    """The place of the row of names: the last one above the numbers that holds one of these `columns`.
+
+    Where none does it is a row whose cells can be names, with or without a row of units below. Above it lies what a
+    logger writes of itself.
+    """
+    width = len(rows[-1]) if rows else 0
+    first = len(rows)
+    while first > 0 and len(rows[first - 1]) == width and has_number(rows[first - 1], decimal):
+        first -= 1
+    named = [place for place in range(first) if {cell.strip() for cell in rows[place]} & set(columns)]
+    fit = [place for place in (first - 2, first - 1) if place >= 0 and is_head(rows[place], rows[first:])]
+    return next(iter([*named[-1:], *fit]), max(first - 1, 0))
+
+
+def has_number(row: Sequence[str], decimal: str) -> bool:
+    """Whether any cell of a row is a number."""
+    return any(is_number(cell, decimal) for cell in row)
+
+
+def is_head(row: Sequence[str], body: Rows) -> bool:
+    """Whether the cells of a row may be the names of the columns of a body: one each, and all different."""
+    below = body[0] if body else row
+    filled = [cell.strip() for cell in row if cell.strip()]
+    every = all(name.strip() for name, cell in zip(row, below, strict=False) if cell.strip())
+    return len(row) == len(below) and every and len(set(filled)) == len(filled)
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Whether a cell holds a number with this decimal sign."""
+    if decimal != "." and "." in cell:
+        return False
+    try:
+        float(cell.replace(decimal, "."))
+    except ValueError:
+        return False
+    return True
