@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
@@ -49,7 +50,9 @@ LONG = 20  # steps of such a fit
 TOGETHER = 2  # of such fits, those that are fitted to their end
 STIFFNESS = "column.stiffness"  # what a law with the planned stiffness has beside it where that is wrong
 OTHERWISE = 1.25  # factor on the planned stiffness beyond which a law of yielding does not find its own way
-STIFFER = 10.0  # a spring that gives way by a tenth of the motion, between one that bends it and one that is not seen
+# Over the secant of the whole column: a spring that gives way by a tenth of the motion, between one that bends it and
+# one that is not seen, and softer ones, which a part beside the column may have.
+STIFFNESSES = (0.1, 1.0, 10.0)
 BETTER = 0.9  # of what is left beyond noise: less of it is worth another law than the first
 
 
@@ -79,18 +82,19 @@ def ending(better: list[Fit], fits: list[Fit]) -> list[Fit]:
     return better
 
 
-def raced(fits: list[Fit]) -> dict[str, Fit]:
+def raced(fits: list[Fit], most: float = math.inf) -> dict[str, Fit]:
     """The fits whose last effect leaves less under another law than the first, by that effect.
 
-    The laws of all effects are fitted for a few steps, and those that then lead to their end.
+    The laws of all effects are fitted for a few steps, and those that then lead to their end, unless they leave more
+    than `most` or far more than the best of the fits.
     """
     firsts = {item.names[-1]: item for item in reversed(fits)}
     starts = [start for item in firsts.values() for start in begun(item)]
-    least = min(map(excess, fits))
+    most = min(most, FARTHEST * min(map(excess, fits)))
     found: dict[str, list[Fit]] = {}
     with ThreadPoolExecutor(WORKERS) as pool:
         rough = sorted(pool.map(lambda start: fitted(start, ROUGH, 1), starts), key=cost)
-        leading = [item for item in rough[:LEADING] if excess(item) <= FARTHEST * least]
+        leading = [item for item in rough[:LEADING] if excess(item) <= most]
         for item in pool.map(lambda item: fitted(item, STEPS, ROUNDS), leading):
             found.setdefault(item.names[-1], []).append(item)
     chosen = {name: simplest(firsts[name], others) for name, others in found.items()}
@@ -184,9 +188,9 @@ def starts(
     if law.model in followed:
         yield base | as_specimen(effect, law, strength, followed[law.model])
         return
-    base |= stiff(fit, effect, law)
-    for share, shape in itertools.product(NEARER.tolist(), shapes(fit, effect, place)):
-        yield base | shape | {strength.name: within(strength, share * base[strength.name])}
+    ways = itertools.product(NEARER.tolist(), shapes(fit, effect, place), stiff(fit, effect, law))
+    for share, shape, spring in ways:
+        yield base | shape | spring | {strength.name: within(strength, share * base[strength.name])}
 
 
 def as_specimen(
@@ -264,14 +268,14 @@ def beside(fit: Fit, effect: Effect, place: int, found: SpecimenFit) -> Values:
     return {STIFFNESS: {parameter.name: within(parameter, factor)}} | result
 
 
-def stiff(fit: Fit, effect: Effect, law: Law) -> dict[str, float]:
-    """A stiffness that only this law has, at `STIFFER` times the largest force over the largest deformation."""
+def stiff(fit: Fit, effect: Effect, law: Law) -> list[dict[str, float]]:
+    """A stiffness that only this law has, at `STIFFNESSES` times the largest force over the largest deformation."""
     way = path(fit.data.part)
-    if way is None:
-        return {}
-    secant = float(np.max(np.abs(way[1])) / np.max(np.abs(way[0])))
     names = [item for item in effect.further if item.name in law.shapes and item.unit == "N/m"]
-    return {item.name: within(item, STIFFER * secant) for item in names}
+    if way is None or not names:
+        return [{}]
+    secant = float(np.max(np.abs(way[1])) / np.max(np.abs(way[0])))
+    return [{item.name: within(item, share * secant) for item in names} for share in STIFFNESSES]
 
 
 def shapes(fit: Fit, effect: Effect, place: int) -> list[dict[str, float]]:

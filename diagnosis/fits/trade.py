@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnosis.fits import candidates, fitting, worth
+from diagnosis.fits import candidates, fitting, laws, worth
 from diagnosis.fits.candidates import TIED
-from diagnosis.fits.fitting import Fit
+from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Problem, left_out
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.unexplained import leaves
@@ -23,6 +23,10 @@ from diagnosis.fits.unexplained import leaves
 # take twice its root: from here on by more than `TIED`, but for one chance in a thousand.
 APART = 36.0
 RIVALS = 2  # single effects behind the best one that are tried with a second one
+# Of what one effect by itself leaves: less must be left after a few steps under another of its laws if this is to do
+# what two effects do. A spring and dashpot in series beside a column leave 0.3 then, in place of a dashpot and a lag.
+NEARING = 0.5
+CLOSE = 3.0  # times what two effects leave: one that leaves less is moved to the bottom of its valley
 TRIED = 3  # candidates that are fitted in such a place: they must come close at once
 
 
@@ -48,7 +52,7 @@ def traded(
 
     `first` are the fits with one effect, best first; no description has more than `most` effects.
     """
-    found = [*joined(chosen, scales), *alone(chosen)]
+    found = [*joined(chosen, scales), *alone(chosen), *under_others(chosen)]
     if len(chosen.names) < most:
         found += parted(bare, chosen, scales)
         found += paired(bare, chosen, first, scales)
@@ -91,14 +95,30 @@ def alone(fit: Fit) -> list[Fit]:
     return result
 
 
+def under_others(fit: Fit) -> list[Fit]:
+    """Fits without one of the effects, with another one of them under a further of its laws.
+
+    A law that does what two effects do is else tried only where its effect comes last, and not where another one is
+    chosen first or where the first law with that other effect leaves nothing.
+    """
+    result: list[Fit] = []
+    for gone, name in itertools.permutations(fit.names, 2):
+        if len(fit.data.catalogue[name].laws) > 1:
+            rest = {key: values for key, values in fit.values.items() if key not in (gone, name)}
+            less = fitting.fit(fit.data, rest | {name: fit.values[name]}, fit.z)
+            result += laws.raced([less], NEARING * excess(less)).values()
+    near = [item for item in result if excess(item) < CLOSE * max(excess(fit), TIED)]
+    return [laws.settled(item) for item in near]
+
+
 def parted(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:
     """Fits in which an effect has the first of its laws and another effect stands beside it, as good or worth it.
 
     Effects that one model holds together are left as they are: one of them under another law explains little.
     """
     result = []
-    laws = {name: fit.data.catalogue[name].law(values) for name, values in fit.values.items()}
-    whole = {held for name, law in laws.items() if law and law.beside for held in (name, *law.beside)}
+    formulas = {name: fit.data.catalogue[name].law(values) for name, values in fit.values.items()}
+    whole = {held for name, law in formulas.items() if law and law.beside for held in (name, *law.beside)}
     for name, values in fit.values.items():
         if not values.get("law") or name in whole:
             continue

@@ -26,7 +26,7 @@ PRESENT, STIFFNESS, YIELDS, DEGRADATION, PINCHING, PINCHING_WIDTH, PINCHING_HARD
 FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP, FRICTION_VELOCITY = range(7, 13)
 ASYMMETRY, DROP, SPEED, PLAY, BESIDE, CENTRES, STIFFENING, BEND = range(13, 21)
 SECOND_STIFFENING, SECOND_BEND, PINCHING_TAILS, SLIDES, CORNER = range(21, 26)
-POWER, DASHPOT, EXPONENT, SPRING = range(26, 30)
+POWER, DASHPOT, EXPONENT, SPRING, RELAXING = range(26, 31)
 
 # places in `cell`; the last three are the specimen's place within play, the force that it carried there, and the force
 # of a dashpot behind a spring
@@ -46,7 +46,7 @@ LAWS = (
 )  # of yielding, in the order of `ColumnEffects.law`
 PLAYS = ORIGIN, RESTING, HELD, PARTLY, ROUNDED = range(5)  # where the gap is: see `column.slip`
 IN_PLACE = 2  # of `ColumnEffects.friction_law`: a slider in the place of the planned specimen
-BY_POWER, DASHPOT_IN_PLACE = 1, 2  # of `ColumnEffects.viscous_law`
+BY_POWER, DASHPOT_IN_PLACE, DASHPOT_BESIDE = 1, 2, 3  # of `ColumnEffects.viscous_law`
 TWICE = 2  # of `ColumnEffects.stiffening_law`: with two bends
 STIFFENED_AT = 2e-3  # m, reference deformation of hardening with the square of the deformation
 DEGRADED_AT = (
@@ -113,6 +113,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         power if vacant and more.viscous_law == DASHPOT_IN_PLACE else 0.0,
         more.viscous_exponent,
         more.viscous_stiffness,
+        power if more.viscous_law == DASHPOT_BESIDE else 0.0,
     ]
     law = np.array(more.learned)
     return Specimen(
@@ -231,9 +232,7 @@ def carried(specimen: Specimen, within: float, rate: float, step: float) -> floa
         level = friction.left(rate, 0.0, effects[DROP], effects[SPEED])
         result, elastic = slider.moved(specimen.sliding, specimen.slid, within, level), 0.0
     elif effects[DASHPOT] != 0.0:
-        held = specimen.cell[DAMPED] + effects[SPRING] * rate * step
-        result = dashpot.relaxed(held, effects[SPRING] * step, effects[DASHPOT], effects[EXPONENT])
-        specimen.cell[DAMPED], elastic = result, 0.0
+        result, elastic = damped(effects, specimen.cell, effects[DASHPOT], rate, step), 0.0
     else:
         result = specimens.step(specimen.code, specimen.params, specimen.memory, within)
         elastic = effects[STIFFNESS] * within
@@ -251,6 +250,25 @@ def carried(specimen: Specimen, within: float, rate: float, step: float) -> floa
         farther = effects[SECOND_BEND]
         result += effects[SECOND_STIFFENING] * (within - min(max(within, -farther), farther))
     return result
+
+
+@jit
+def damped(effects: Array, cell: Array, coefficient: float, rate: float, step: float) -> float:
+    """Force (N) of a dashpot (N·s/m) behind its spring at the end of a `step` (s) at a rate (m/s)."""
+    held = cell[DAMPED] + effects[SPRING] * rate * step
+    cell[DAMPED] = dashpot.relaxed(held, effects[SPRING] * step, coefficient, effects[EXPONENT])
+    return float(cell[DAMPED])
+
+
+@jit
+def beside(effects: Array, cell: Array, rate: float, step: float) -> float:
+    """Force (N) of the dashpots beside the specimen at the end of a `step` (s) at a rate (m/s)."""
+    result = effects[VISCOUS] * rate
+    if effects[POWER] != 0.0:
+        result += dashpot.force(rate, effects[POWER], effects[EXPONENT])
+    if effects[RELAXING] != 0.0:
+        result += damped(effects, cell, effects[RELAXING], rate, step)
+    return float(result)
 
 
 @jit
@@ -289,9 +307,7 @@ def with_effects(specimen: Specimen, deformation: float, step: float) -> float:
     if specimen.learned.size > 0:
         result += preisach.step(specimen.learned, specimen.learned_memory, deformation, rate)
     cell[REACTION] = result
-    result += effects[VISCOUS] * rate
-    if effects[POWER] != 0.0:
-        result += dashpot.force(rate, effects[POWER], effects[EXPONENT])
+    result += beside(effects, cell, rate, step)
     if effects[INERTIA] != 0.0 and cell[LAST_STEP] > 0.0:
         result += effects[INERTIA] * (rate - cell[RATE]) / (0.5 * (step + cell[LAST_STEP]))
     cell[DEFORMATION] = deformation

@@ -13,7 +13,7 @@ from diagnosis.fits import fitting, hypothesis, laws, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.residuals import Data
-from diagnosis.fits.trade import alone, simplest
+from diagnosis.fits.trade import alone, simplest, under_others
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.nuisances import Nuisance
 from diagnosis.recorded.parts import ColumnAlone, Part
@@ -356,6 +356,37 @@ def test_a_fluid_damper_is_viscous_with_its_exponent_whatever_stiffness_is_plann
     assert values["coefficient"] == pytest.approx(part.COEFFICIENT, rel=0.05)
     assert values["stiffness"] == pytest.approx(part.SPRING, rel=0.1)
     assert found.chi < 1.2 * found.reduced.size
+
+
+class Relaxing(FrictionDamper):
+    """A column alone that is a spring beside a spring and a dashpot in series, exact for a constant rate."""
+
+    BRANCH, TIME = 0.25 * K, 0.03  # N/m, s
+
+    def __init__(self) -> None:
+        super().__init__()
+        fade, f = np.exp(-INTERVAL / self.TIME), 0.0
+        force = K * self.inputs
+        for tick, moved in enumerate(np.diff(self.inputs, prepend=0.0)):
+            f = fade * f + self.BRANCH * moved * self.TIME / INTERVAL * (1.0 - fade)
+            force[tick] += f
+        self.measured = (force + NOISE * np.random.default_rng(4).standard_normal(TICKS))[:, None]
+        self.candidates = tuple(CATALOGUE[name] for name in ("column.viscous", "sensor.column_force.lag"))
+
+
+def test_a_relaxing_part_is_one_effect_also_where_two_are_found_that_do_the_same() -> None:
+    group, train = residuals.withheld(TICKS, INTERVAL)
+    level, part = np.array([NOISE]), Relaxing()
+    data = Data(part, System(Plan()), level, level, group, train, np.zeros(1))
+    start = {"column.viscous": {"coefficient": 150e3}, "sensor.column_force.lag": {"time_constant": 0.01}}
+    two = fitting.fit(data, start)
+    assert two.chi < 1.2 * two.reduced.size
+    stands, _ = simplest([two, *under_others(two)])
+    values = stands.values["column.viscous"]
+    assert stands.names == ("column.viscous",)
+    assert values["law"] == 3
+    assert values["stiffness"] == pytest.approx(part.BRANCH, rel=0.05)
+    assert values["coefficient"] == pytest.approx(part.BRANCH * part.TIME, rel=0.05)
 
 
 class SoftlyPlanned(Driven):

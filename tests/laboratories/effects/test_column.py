@@ -384,6 +384,19 @@ def test_a_dashpot_behind_a_spring_solves_maxwells_equation(exponent: float) -> 
     assert np.max(np.abs(got - exact)) < 0.02 * np.max(np.abs(exact))
 
 
+def test_a_dashpot_behind_a_spring_beside_the_specimen_solves_maxwells_equation() -> None:
+    _, path = cycles(2e-3, 1.0, 1)
+    stiffness, relaxation, h, f = 3e6, 0.03, SHORT, 0.0
+    exact = [0.0]
+    for moved in np.diff(path):  # exact for a constant rate
+        fade = math.exp(-h / relaxation)
+        f = fade * f + stiffness * moved * relaxation / h * (1.0 - fade)
+        exact.append(f)
+    more = ColumnEffects(viscous=stiffness * relaxation, viscous_law=3.0, viscous_stiffness=stiffness)
+    got = specimen_under(path, more) - K * path
+    assert np.max(np.abs(got - np.array(exact))) < 0.02 * np.max(np.abs(exact))
+
+
 def test_one_law_alone_takes_the_place_of_the_planned_specimen() -> None:
     path = through(3e-3, -3e-3)
     yields = ColumnEffects(yield_displacement=1e-3, law=1.0)

@@ -22,6 +22,11 @@ def test_forces_resist_motion_and_deformation() -> None:
     extra = play_a(effect("column.viscous", coefficient=5e4))["column_force"] - CLEAN["column_force"]
     assert np.mean(extra * v) > 0.0
     assert np.interp(0.02, *paired(v, extra)) == pytest.approx(1000.0, rel=0.03)
+    relaxing = (
+        play_a(effect("column.viscous", "maxwell", coefficient=5e4))["column_force"] - CLEAN["column_force"]
+    )
+    given = relaxing + 0.03 * np.gradient(relaxing, DT)  # f + τ·ḟ = c·v
+    assert np.allclose(given[5:-5], 5e4 * v[5:-5], atol=0.02 * np.max(np.abs(5e4 * v)))
     extra = play_a(effect("column.inertia", mass=1000.0))["column_force"] - CLEAN["column_force"]
     assert np.corrcoef(extra[500:], np.gradient(v, DT)[500:])[0, 1] > 0.95
     extra = play_a(effect("column.hardening", share=0.1))["column_force"] - CLEAN["column_force"]

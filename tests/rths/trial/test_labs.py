@@ -152,7 +152,6 @@ CASES: dict[str, tuple[dict[str, float], dict[str, float], set[str]]] = {
     "x.actuator.droop": ({"loss": 0.3}, {"loss": 1e-6}, set()),
     "x.actuator.valve_hysteresis": ({"width": 4e-4}, {"width": 1e-9}, set()),
     "column.hardening": ({"share": 0.3}, {"share": 1e-6}, A),
-    "x.column.creep": ({"share": 0.1, "relaxation_time": 1.0}, {"share": 1e-6, "relaxation_time": 1.0}, A),
     "x.column.asymmetry": ({"share": 0.1}, {"share": 1e-6}, A),
     "x.table.pitch": (
         {"coupling": 0.3, "frequency": 10.0},

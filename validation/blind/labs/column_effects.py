@@ -79,7 +79,7 @@ def rubbing(values: Values, *, force: float, presliding: float = 1e-5) -> None:
 
 
 def viscous(values: Values, *, coefficient: float) -> None:
-    """Coefficient of the rate-dependent force at 20 mm/s."""
+    """Coefficient of the rate-dependent force at 20 mm/s, or of the dashpot behind a spring."""
     values["viscous"] = coefficient
 
 
@@ -111,11 +111,6 @@ def valve_hysteresis(values: Values, *, width: float) -> None:
 def hardening(values: Values, *, share: float) -> None:
     """Share of the stiffness gained at 2 mm, beside which it grows still faster."""
     values["hardened"] = share
-
-
-def creep(values: Values, *, share: float, relaxation_time: float) -> None:
-    """Maxwell element parallel to the column: its stiffness over k, its time constant."""
-    values |= {"creep": share, "relaxation": relaxation_time}
 
 
 def asymmetry(values: Values, *, share: float) -> None:
@@ -152,13 +147,14 @@ KNOWN = {
     "column.friction": KnownEffect(
         rubbing, {"tanh": friction.TANH, "dahl": friction.DAHL, "lugre": friction.LUGRE}, "rubbing"
     ),
-    "column.viscous": KnownEffect(viscous, {"power": 0}),
+    "column.viscous": KnownEffect(
+        viscous, {"power": specimen.BY_POWER, "maxwell": specimen.MAXWELL}, "damping"
+    ),
     "column.inertia": KnownEffect(inertia, PLAIN),
     "column.slip": KnownEffect(slip, {"smooth": 0}),
     "column.hardening": KnownEffect(hardening, {"sinh": 0}),
     "x.actuator.ripple": KnownEffect(ripple, PLAIN),
     "x.actuator.droop": KnownEffect(droop, PLAIN),
     "x.actuator.valve_hysteresis": KnownEffect(valve_hysteresis, PLAIN),
-    "x.column.creep": KnownEffect(creep, PLAIN),
     "x.column.asymmetry": KnownEffect(asymmetry, PLAIN),
 }

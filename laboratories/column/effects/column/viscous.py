@@ -4,7 +4,13 @@
 
 With `law` 1 it is a power of the rate, coefficient·v₀·|δ̇/v₀|^exponent with v₀ = 0.1 m/s. With `law` 2 the specimen
 itself is such a dashpot behind a spring of `stiffness`, as a fluid damper with its brackets: it takes the place of the
-planned specimen, unless another effect does (`models/dashpot.py`).
+planned specimen, unless another effect does (`models/dashpot.py`). With `law` 3 a dashpot behind such a spring lies
+beside the specimen and is linear, as in concrete or rubber that relaxes:
+
+    f = f_column + f_m,    ḟ_m = stiffness·δ̇ − f_m·stiffness/coefficient
+
+A linear specimen with this branch is also one with a dashpot of coefficient·(1 + k/stiffness) beside it whose load cell
+has a lag of coefficient/stiffness: one cause instead of two.
 
 Not to be confused with a lag of the load cell or of the displacement reading, which gives a linear specimen the same
 loop; nor with `column.friction`, whose force does not grow with speed.
@@ -30,7 +36,9 @@ EFFECT = sets(
     },
     further={
         "viscous_law": which_law(
-            2.0, "0 with the rate, 1 with a power of it, 2 that behind a spring, in the specimen's place"
+            3.0,
+            "0 with the rate, 1 with a power of it, 2 that behind a spring, in the specimen's place, "
+            "3 linear behind a spring, beside the specimen",
         ),
         "viscous_exponent": Parameter(
             "exponent",
@@ -49,7 +57,7 @@ EFFECT = sets(
             least=1.0,
             most=1e13,
             sizes=(),
-            says="stiffness of the spring of law 2",
+            says="stiffness of the spring of laws 2 and 3",
             shape=True,
         ),
     },
@@ -57,6 +65,7 @@ EFFECT = sets(
         Law("with the rate", {}),
         Law("with a power of the rate", {"exponent": 0.6}),
         Law("a dashpot behind a spring in the specimen's place", {"exponent": 0.6, "stiffness": 1e7}),
+        Law("a dashpot behind a spring beside the specimen", {"stiffness": 1e7}),
     ),
     says="force that grows with the rate of deformation",
     reference="f = f_column + coefficient·δ̇",

@@ -10,6 +10,7 @@ from validation.blind.labs.parts.compiled import Array, jit
 
 LINEAR, EXPONENTIAL = 1, 2  # formulas of the degradation
 LORENTZ, SECH = 1, 2  # formulas of the pinching
+BY_POWER, MAXWELL = 1, 2  # formulas of the rate-dependent force
 # Deformations (m) of the damage, within the peaks of the trial's columns: nothing is lost up to the first; the linear
 # loss is complete at the second beyond it; the third is the scale of the exponential loss.
 UNDAMAGED, DESTROYED, DAMAGE = 0.5e-3, 4e-3, 1e-3
@@ -21,10 +22,11 @@ STICKING = 1e-3  # scale of the Stribeck effect
 MICRO = 0.5e-3
 POWER = 0.8  # exponent of the rate-dependent force; fluid dampers have 0.3 to 1 (Soong and Dargush)
 POWER_AT = 0.02  # m/s, at which it equals the linear force: a usual speed of the default test's column
+RELAXATION = 0.03  # s, time constant of the spring and dashpot in series, within a cycle of the default test
 
 # places in `memory`, behind those of the yielding
-LARGEST, BRISTLE, CREEP, INSIDE, DEFORMATION, VELOCITY = range(yielding.SIZE, yielding.SIZE + 6)
-SIZE = yielding.SIZE + 6
+LARGEST, BRISTLE, RELAXING, DEFORMATION, VELOCITY = range(yielding.SIZE, yielding.SIZE + 5)
+SIZE = yielding.SIZE + 5
 
 
 class TrueSpecimen(NamedTuple):
@@ -44,12 +46,11 @@ class TrueSpecimen(NamedTuple):
     rubbing: float = 0.0  # formula
     friction: float = 0.0  # N
     presliding: float = 1e-5  # m
+    damping: float = 0.0  # formula
     viscous: float = 0.0  # N·s/m
     inertia: float = 0.0  # kg
     slip: float = 0.0  # m
     hardened: float = 0.0  # stiffness gained at HARDENED_AT over k, by the first term of its series
-    creep: float = 0.0  # stiffness of the Maxwell element over k
-    relaxation: float = 1.0  # s
     asymmetry: float = 0.0
 
 
@@ -150,16 +151,14 @@ def force(p: TrueSpecimen, memory: Array, deformation: float, step: float) -> tu
     moved = deformation - memory[DEFORMATION]
     velocity = moved / step
     result = restoring(p, memory, inside)
-    if p.creep > 0.0:
-        move = inside - memory[INSIDE]
-        memory[CREEP] = maxwell(memory[CREEP], p.creep * p.stiffness, p.relaxation, move, step)
-        result += memory[CREEP]
     if p.friction > 0.0:
         result += rub(p, memory, moved, velocity)
-    if p.viscous != 0.0:
+    if p.damping == MAXWELL:
+        memory[RELAXING] = maxwell(memory[RELAXING], p.viscous / RELAXATION, RELAXATION, moved, step)
+        result += memory[RELAXING]
+    elif p.viscous != 0.0:
         result += power_law(p.viscous, velocity)
     reading = result + p.inertia * (velocity - memory[VELOCITY]) / step
-    memory[INSIDE] = inside
     memory[DEFORMATION] = deformation
     memory[VELOCITY] = velocity
     return result, reading
