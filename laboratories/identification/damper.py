@@ -1,9 +1,9 @@
-"""Mass, dashpot, spring, motor and friction of the active mass damper.
+"""Mass, dashpot, spring, motor, friction and a constant force of the active mass damper.
 
-    m·(s̈ + ÿ) = −k·s − c·ṡ − F_c·sgn(ṡ) + u,    T·u̇ + u = gain·command
-    force on the table = k·s + c·ṡ + F_c·sgn(ṡ) − u = −m·(s̈ + ÿ)
+    m·(s̈ + ÿ) = −k·s − c·ṡ − F_c·sgn(ṡ) + F_0 + u,    T·u̇ + u = gain·command
+    force on the table = k·s + c·ṡ + F_c·sgn(ṡ) − F_0 − u = −m·(s̈ + ÿ)
 
-The sign of the friction is regularised to `tanh(ṡ/v₀)`, v₀ = 0.5 mm/s. On a still table the stroke alone
+The sign of the friction is regularised to `tanh(ṡ/v₀)`. On a still table the stroke alone
 shows ratios only (gain/m, c/m, k/m, F_c/m): the mass, and with it the gain, comes from the force. Without
 a measured force those intervals are infinite.
 """
@@ -31,14 +31,16 @@ SUBSTEP = 0.25e-3  # s: an eighth of the usual interval, short beside the motor'
 PIECE = 1.0
 # ticks on each side from which initial stroke and velocity are read: 20 ms, less than half a period of 20 Hz
 REACH = 10
-CREEP = 5e-4  # v₀, m/s: about 0.1 % of the velocities of a test, so that the friction force has no jump
+# v₀, m/s: 0.01 % of the velocities of a test, so that the friction force has no jump. It is larger where friction would
+# stop the mass within a step, which the steps could not follow.
+SLOWEST = 1e-5
 # share of a signal's scatter that its weight takes as least misfit, so that an exact fit has a finite weight
 WORST = 1e-9
 ROUNDS = (
     3  # of weighting both signals by their misfit; it ends earlier when the weights change by less than 10 %
 )
-NAMES = ("mass", "damping", "stiffness", "motor_time_constant", "gain", "friction")
-UNITS = ("kg", "N·s/m", "N/m", "s", "", "N")
+NAMES = ("mass", "damping", "stiffness", "motor_time_constant", "gain", "friction", "offset")
+UNITS = ("kg", "N·s/m", "N/m", "s", "", "N", "N")
 
 
 @dataclass(frozen=True)
@@ -72,13 +74,14 @@ def respond(
     acceleration is linear between ticks.
     """
     command, ground, stroke, force = record.command, record.ground, record.stroke, record.force
-    mass, damping, stiffness, lag, gain, friction = p[0], p[1], p[2], p[3], p[4], p[5]
+    mass, damping, stiffness, lag, gain, friction, offset = p[0], p[1], p[2], p[3], p[4], p[5], p[6]
     h = interval / substeps
+    creep = max(SLOWEST, abs(friction) * h / mass)
     fade = np.exp(-0.5 * h / lag) if lag > 0.0 else 0.0
     x, v, u = begin[0], begin[1], 0.0
     for k in range(command.size):
         stroke[k] = x
-        force[k] = stiffness * x + damping * v + friction * np.tanh(v / CREEP) - u
+        force[k] = stiffness * x + damping * v + friction * np.tanh(v / creep) - offset - u
         if k == command.size - 1:
             break
         target = gain * command[k]
@@ -89,15 +92,15 @@ def respond(
             u_middle = target + (u - target) * fade
             u_end = target + (u_middle - target) * fade
             y0 = ground[k] + slope * i
-            a1 = (u - stiffness * x - damping * v - friction * np.tanh(v / CREEP)) / mass - y0
+            a1 = (u + offset - stiffness * x - damping * v - friction * np.tanh(v / creep)) / mass - y0
             xm, vm = x + 0.5 * h * v, v + 0.5 * h * a1
-            drive = u_middle / mass - y0 - 0.5 * slope
-            a2 = drive - (stiffness * xm + damping * vm + friction * np.tanh(vm / CREEP)) / mass
+            drive = (u_middle + offset) / mass - y0 - 0.5 * slope
+            a2 = drive - (stiffness * xm + damping * vm + friction * np.tanh(vm / creep)) / mass
             xn, vn = x + 0.5 * h * vm, v + 0.5 * h * a2
-            a3 = drive - (stiffness * xn + damping * vn + friction * np.tanh(vn / CREEP)) / mass
+            a3 = drive - (stiffness * xn + damping * vn + friction * np.tanh(vn / creep)) / mass
             xe, ve = x + h * vn, v + h * a3
-            drive = u_end / mass - y0 - slope
-            a4 = drive - (stiffness * xe + damping * ve + friction * np.tanh(ve / CREEP)) / mass
+            drive = (u_end + offset) / mass - y0 - slope
+            a4 = drive - (stiffness * xe + damping * ve + friction * np.tanh(ve / creep)) / mass
             x += h * (v + 2.0 * vm + 2.0 * vn + ve) / 6.0
             v += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
             u = u_end
@@ -106,7 +109,7 @@ def respond(
 def response(
     values: Array, command: Array, ground: Array, interval: float, start: float = 0.0, rate: float = 0.0
 ) -> tuple[Array, Array]:
-    """Stroke (m) and force (N), each (n,), for parameters (6,) in the order of NAMES."""
+    """Stroke (m) and force (N), each (n,), for parameters (7,) in the order of NAMES."""
     stroke, force = np.empty(command.size), np.empty(command.size)
     substeps = max(int(np.ceil(interval / SUBSTEP - 1e-9)), 1)
     respond(values, interval, substeps, DamperRecord(command, ground, stroke, force), (start, rate))
@@ -153,13 +156,13 @@ def least_squares(
 
     `damper_command` (N, held from tick k to k + 1), `stroke` (m), `force` (N, on the table; None where not measured)
     and `table_acceleration` (m/s²; None on a still table) have one value per tick of `interval` (s). `free` names what
-    is fitted, of mass (kg), damping (N·s/m), stiffness (N/m), motor_time_constant (s), gain and friction (N); the
-    others keep the `nominal` damper's values, gain 1 and friction 0, from which the fit also starts. The initial state
-    is fitted too; a drive whose nominal stiffness is 0 is simulated anew every second from its measured motion. The
-    output error is minimised, with both signals weighted by their scatter; intervals follow from Jacobian and residual,
-    corrected for the autocorrelation of each signal (`estimate.of_fit`). A friction near zero may be estimated as
-    negative within its interval. Parameters that the record cannot separate (mass and gain without a force) have
-    infinite intervals.
+    is fitted, of mass (kg), damping (N·s/m), stiffness (N/m), motor_time_constant (s), gain, friction (N) and offset
+    (N, along +x); the others keep the `nominal` damper's values, gain 1, and no friction or offset, from which the fit
+    also starts. The initial state is fitted too; a drive whose nominal stiffness is 0 is simulated anew every second
+    from its measured motion. The output error is minimised, with both signals weighted by their scatter; intervals
+    follow from Jacobian and residual, corrected for the autocorrelation of each signal (`estimate.of_fit`). A friction
+    near zero may be estimated as negative within its interval. Parameters that the record cannot separate (mass and
+    gain without a force) have infinite intervals.
 
     Raises:
         InputError: too short, unequal lengths, not finite, no excitation, constant stroke, or an unknown
@@ -202,10 +205,10 @@ def fit(
     from scipy import optimize
 
     values = np.array(
-        [nominal.mass, nominal.damping, nominal.stiffness, nominal.motor_time_constant, 1.0, 0.0]
+        [nominal.mass, nominal.damping, nominal.stiffness, nominal.motor_time_constant, 1.0, 0.0, 0.0]
     )
     effort = max(float(np.std(command)), nominal.mass * float(np.std(ground)))
-    scales = np.where(values > 0.0, values, [1.0, 1.0, 1.0, interval, 1.0, 0.05 * effort])
+    scales = np.where(values > 0.0, values, [1.0, 1.0, 1.0, interval, 1.0, 0.05 * effort, 0.05 * effort])
     travel = float(np.std(outputs[0]))
     speed = max(float(np.std(np.gradient(outputs[0], interval))), 1e-9)
     nuisance = np.array([travel, speed])
@@ -220,7 +223,7 @@ def fit(
         return response(now, command, ground, interval, float(begin[0]), float(begin[1]))
 
     x = np.append(values[places] / scales[places], [outputs[0][0] / travel, 0.0])
-    least = np.array([1e-2, 0.0, 0.0, 0.0, 1e-3, -1e3])[places]
+    least = np.array([1e-2, 0.0, 0.0, 0.0, 1e-3, -1e3, -1e3])[places]
     low = np.append(least, [-np.inf, -np.inf])
     high = np.append(np.full(len(places), 1e3), [np.inf, np.inf])
     weights = [1.0 / float(np.std(output)) for output in outputs]

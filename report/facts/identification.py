@@ -147,15 +147,18 @@ def of_table(run: Run, interval: float) -> dict[str, Any]:
 
 
 def of_damper(run: Run, interval: float) -> dict[str, Any]:
-    """Mass, spring, dashpot, friction, lag and gain of the motor."""
+    """Mass, spring, dashpot, friction, a constant force, lag and gain of the motor.
+
+    A spring or a lag of the motor that the plan says is absent is not fitted.
+    """
     columns = run.columns[topic_of(run, "damper")]
     plan = plan_of(run)
     still = part_of(run) == "damper"
     force = columns.get("damper_force")
     # The motor's gain cannot be separated from the mass without a measured force.
     free = [name for name in damper.NAMES if name != "gain" or force is not None]
-    if plan and plan.damper.stiffness == 0.0:
-        free.remove("stiffness")
+    absent = ("stiffness", "motor_time_constant")
+    free = [name for name in free if not (plan and name in absent and getattr(plan.damper, name) == 0.0)]
     fit = damper.least_squares(
         columns["damper_command"],
         columns["damper_stroke"],

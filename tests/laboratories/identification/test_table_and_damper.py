@@ -15,7 +15,7 @@ from common.errors import InputError
 from common.plan.laboratory_tables import Damper, ShakingTable
 from laboratories.identification import damper, table
 from laboratories.table import model as table_lab
-from tests.rths.test_free_drive import DASHPOT, FRICTION, INTERVAL, MASS, drive
+from tests.rths.test_free_drive import DASHPOT, FRICTION, INTERVAL, MASS, OFFSET, drive
 
 DT = 0.002
 SEEDS = range(20)
@@ -165,11 +165,11 @@ def test_a_damper_without_a_spring_is_identified_piece_by_piece() -> None:
     planned = replace(
         Damper(), mass=1.1 * MASS, stiffness=0.0, damping=0.8 * DASHPOT, motor_time_constant=0.0
     )
-    free = ("mass", "damping", "friction")
+    free = ("mass", "damping", "friction", "offset")
     found = damper.least_squares(force, position, None, None, INTERVAL, free=free, nominal=planned)
-    for name, true in {"mass": MASS, "damping": DASHPOT, "friction": FRICTION}.items():
-        assert found[name].low < true < found[name].high, name
-        assert found[name].value == pytest.approx(true, rel=0.15), name
+    for name, true in {"mass": MASS, "damping": DASHPOT, "friction": FRICTION, "offset": OFFSET}.items():
+        assert found[name].value == pytest.approx(true, rel=0.01), name
+        assert found[name].high - found[name].low < 0.02 * true, name
 
 
 def test_a_shaken_table_excites_the_damper() -> None:
