@@ -37,10 +37,10 @@ OWN = 0.4
 LONE, QUIET = 10.0, 2.0
 # Standard deviations of Σ z² above its mean from which on the nominal parameters speak against the effects beside them.
 STRAINED = 3.0
-# A stand-in rarely explains more than nine tenths of a gap's energy, the true mechanism under another law rarely less:
-# on the set "tune" stand-ins explained 0.59 to 0.87 of it where no nominal parameter was at its bound, true mechanisms
-# 0.94 to 1.00.
-REST = 0.1
+# A stand-in rarely explains more than 0.94 of a gap's energy, the true mechanism under another law rarely less: on the
+# set "tune" and on effects of no catalogue stand-ins explained 0.59 to 0.93 of it where no nominal parameter was at its
+# bound, true mechanisms 0.95 to 1.00.
+REST = 0.06
 # Stand-ins per true name among the verdicts that leave nothing: 5 of 78 were wrong (docs/reference/blind.md).
 FALSE = 0.06
 # Distance from the bound, in tolerances, within which a nominal parameter counts as pinned to it.
@@ -73,8 +73,7 @@ class PartVerdict:
 def judge(search: Search) -> PartVerdict:
     """The verdict on a part."""
     if not search.chosen.names:
-        name = lone_noise(search.chosen)
-        bare = in_white_noise(search) if name else search
+        bare, name = heard_as_noise(search)
         outcome = without_effects(bare)
         return PartVerdict(bare, outcome, 1.0, (), (), doubted=name if outcome == "unknown" else "")
     outcome = how_well(search)
@@ -141,6 +140,28 @@ def unnamed(search: Search) -> PartVerdict:
     return PartVerdict(
         bare, "unknown", DOUBT["unknown"], tuple(zip(near, map(float, chances), strict=True)), ()
     )
+
+
+def heard_as_noise(search: Search) -> tuple[Search, str]:
+    """A search without effects, under white noise where coloured noise of readings may hide an unknown effect.
+
+    With it goes the reading of which that is doubtful, empty where none is: noise that several readings have as they
+    would follow from one motion is that motion.
+    """
+    name = lone_noise(search.chosen)
+    if not name and np.max(sensor_noise.loudest(search.chosen), initial=0.0) < LONE:
+        return search, ""
+    white = in_white_noise(search)
+    if moves(white.chosen):
+        return white, ""
+    return (white, name) if name else (search, "")
+
+
+def moves(fit: Fit) -> bool:
+    """Whether the readings follow from a machine's unknown motion so well that no sensor's error explains as much."""
+    found = ranked(fit)
+    near = [item.site for item in found if item.cost < APART]
+    return bool(near) and not any("sensor." in site for site in near) and found[0].left < REST
 
 
 def lone_noise(fit: Fit) -> str:

@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import InputError
+from diagnosis.fits import residuals
 from diagnosis.signals.noise import quantum
+from models.registry import Array
 
 
 @pytest.mark.parametrize("n", [1, 5, 9, 50, 2000])
@@ -39,3 +41,25 @@ def test_the_quantum_is_found_although_levels_are_missing() -> None:
     assert quantum(np.array([1.0, 1.0, 4.0])) == pytest.approx(3.0)
     assert quantum(np.sin(np.arange(5000) * 0.01)) == 0.0
     assert quantum(np.concatenate([np.zeros(900), np.random.default_rng(0).random(100)])) == 0.0
+
+
+def heavy(seed: int, *shape: int) -> Array:
+    """Noise of rms one whose tails are those of Student's t with four degrees of freedom."""
+    return np.random.default_rng(seed).standard_t(4, shape) / np.sqrt(2.0)
+
+
+def test_tails_that_all_readings_share_count_with_the_level_of_their_noise() -> None:
+    assert residuals.noise(heavy(1, 6000, 3)) == pytest.approx(np.ones(3), abs=0.08)
+
+
+def test_tails_of_some_readings_only_may_be_impacts() -> None:
+    normal = np.random.default_rng(2).standard_normal((6000, 1))
+    found = residuals.noise(np.hstack([heavy(3, 6000, 1), normal]))
+    assert found[0] < 0.9
+    assert found[1] == pytest.approx(1.0, abs=0.04)
+
+
+def test_a_motion_that_grows_has_no_tails() -> None:
+    t = np.linspace(0.0, 12.0, 6000)
+    motion = (np.exp(0.5 * t) * np.sin(12.0 * t))[:, None]
+    assert residuals.tails(np.abs(np.diff(motion, n=4, axis=0))) == 1.0
