@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from diagnosis.fits import candidates, fitting, foretold, hypothesis, laws, settling, trade, worth
+from diagnosis.fits import candidates, fitting, hypothesis, laws, settling, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
@@ -56,7 +56,7 @@ def search(data: Data, scales: Scales) -> Search:
     if remaining(chosen) < worth.LOUD:  # what leaves more has not found its largest effects yet
         chosen = together(chosen, scales)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
-    stands = foretold.holding(bare, chosen, [*others, *first])
+    stands = trade.holding(bare, chosen, [*others, *first])
     if stands is not chosen:
         rest = (item for item in (*others, *first) if item.names not in (chosen.names, stands.names))
         return Search(bare.data, bare, trimmed(stands), tuple(map(trimmed, (chosen, *rest))))

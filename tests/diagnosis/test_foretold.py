@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.plan.plan import Plan
-from diagnosis.fits import fitting, foretold, residuals
+from diagnosis.fits import fitting, residuals, trade
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from laboratories.effects import CATALOGUE
@@ -46,22 +46,22 @@ def fits(truth: Values, beside: float, motion: Array) -> tuple[Fit, Fit, Fit]:
 
 def test_a_simpler_effect_stands_where_it_tells_the_strongest_part() -> None:
     bare, worn, pinched = fits(WORN, 6e3, swelling())
-    assert foretold.holding(bare, pinched, [worn]) is worn
+    assert trade.holding(bare, pinched, [worn]) is worn
 
 
 def test_a_closer_fit_stands_where_the_simpler_one_does_not_tell_the_strongest_part() -> None:
     bare, worn, pinched = fits(PINCHED, 6e3, swelling())
-    assert foretold.holding(bare, pinched, [worn]) is pinched
+    assert trade.holding(bare, pinched, [worn]) is pinched
 
 
 def test_the_fit_decides_where_little_is_left() -> None:
     bare, worn, pinched = fits(WORN, 0.0, swelling())
     exact = replace(pinched, reduced=worn.reduced)
-    assert foretold.holding(bare, exact, [worn]) is exact
+    assert trade.holding(bare, exact, [worn]) is exact
 
 
 @pytest.mark.parametrize("ticks", [0, 300])
 def test_a_motion_that_is_strongest_at_once_has_no_weaker_part(ticks: int) -> None:
     motion = 2e-3 * np.sin(np.pi * np.minimum(np.arange(TICKS) / (ticks + 1), 0.5))
     _, worn, _ = fits(WORN, 0.0, motion)
-    assert foretold.weaker(worn) is None
+    assert trade.weaker(worn) is None
