@@ -56,10 +56,6 @@ def search(data: Data, scales: Scales) -> Search:
     if remaining(chosen) < worth.LOUD:  # what leaves more has not found its largest effects yet
         chosen = together(chosen, scales)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
-    stands = trade.holding(bare, chosen, [*others, *first])
-    if stands is not chosen:
-        rest = (item for item in (*others, *first) if item.names not in (chosen.names, stands.names))
-        return Search(bare.data, bare, trimmed(stands), tuple(map(trimmed, (chosen, *rest))))
     return plainest(Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others))))
 
 

@@ -3,18 +3,12 @@
 Selection one by one does not reach them. Of descriptions that the data cannot tell apart the one with the fewest free
 parameters stands, of these the one with the fewest effects (Schwarz, Annals of Statistics 6 (1978)); the others are
 kept beside it.
-
-Of descriptions that leave much of a gap, a simpler one stands that tells the strongest part of the motion from the
-weaker. Under one motion a law with many parameters imitates a mechanism that it is not: it leaves less than a law with
-few that is nearer to the truth, and holds nowhere else. What is fitted to a weaker motion and judged on a stronger one
-shows it, as another recording would.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -22,10 +16,8 @@ from diagnosis.fits import candidates, fitting, laws, worth
 from diagnosis.fits.candidates import TIED
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Problem, left_out
-from diagnosis.fits.laws import path
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.unexplained import leaves, remaining
-from diagnosis.signals.mask import Mask
+from diagnosis.fits.unexplained import leaves
 
 # Squared distance of two predictions, in noise. Where one of them is true, their costs differ by this distance, give or
 # take twice its root: from here on by more than `TIED`, but for one chance in a thousand.
@@ -36,14 +28,6 @@ RIVALS = 2  # single effects behind the best one that are tried with a second on
 NEARING = 0.5
 CLOSE = 3.0  # times what two effects leave: one that leaves less is moved to the bottom of its valley
 TRIED = 3  # candidates that are fitted in such a place: they must come close at once
-WEAKER = 0.7  # of the largest deformation: the motion until it is first exceeded is the weaker part
-LEAST = (
-    200  # averaged samples of the weaker part, 1.6 s: fewer do not hold the parameters of a law of yielding
-)
-MUCH = 0.05  # of the gap, from which on a fit leaves much: concrete that cracks, named as pinched yielding, left 0.13
-CLEARLY = 0.8  # of what a fit misses in the strongest part: another one must miss less than this
-SIMPLER = 3  # descriptions, best first, that are tried so
-STEPS, ROUNDS = 8, 2  # of such a fit to the weaker part
 
 
 def tied(chosen: Fit, other: Fit) -> bool:
@@ -154,41 +138,3 @@ def paired(bare: Fit, fit: Fit, first: list[Fit], scales: Scales) -> list[Fit]:
         others = candidates.extended(rival, scales, count=TRIED, known=fit)[:1]
         result += [item for item in others if worth.is_worth(bare, fit, item)]
     return result
-
-
-def holding(bare: Fit, chosen: Fit, others: Iterable[Fit]) -> Fit:
-    """The chosen fit, or where that leaves much a simpler one that clearly tells the strongest part better."""
-    if remaining(chosen) < worth.LOUD or excess(chosen) < MUCH * min(excess(bare), bare.data.energy):
-        return chosen
-    train = weaker(chosen)
-    if train is None:
-        return chosen
-    rivals = {
-        item.names: item for item in sorted(others, key=lambda item: -item.cost) if simpler(item, chosen)
-    }
-    leading = sorted(rivals.values(), key=lambda item: item.cost)[:SIMPLER]
-    told = [(foretold(item, train), item) for item in leading]
-    least, best = min(told, key=lambda item: item[0], default=(np.inf, chosen))
-    return best if least < CLEARLY * foretold(chosen, train) else chosen
-
-
-def simpler(fit: Fit, than: Fit) -> bool:
-    """Whether a fit moves fewer parameters of effects than another one."""
-    return len(Problem(fit.data, fit.values).frees) < len(Problem(than.data, than.values).frees)
-
-
-def weaker(fit: Fit) -> Mask | None:
-    """Averaged samples (groups,) before the motion first comes near its largest; None where that part is too short."""
-    data = fit.data
-    way = path(data.part)
-    if way is None or way[0].size != len(data.part.measured):
-        return None
-    far = np.abs(way[0][: data.groups * data.group]).reshape(data.groups, data.group).max(axis=1)
-    result = np.maximum.accumulate(far) < WEAKER * far.max()
-    return result if LEAST <= np.sum(result) < data.groups else None
-
-
-def foretold(fit: Fit, train: Mask) -> float:
-    """What a fit misses beyond the samples `train` (groups,) once its parameters are fitted to these alone."""
-    data = replace(fit.data, train=train)
-    return fitting.fit(data, fit.values, fit.z, STEPS, rounds=ROUNDS).cost
