@@ -190,11 +190,12 @@ def noise(residual: Array) -> Array:
 def tails(apart: Array) -> float:
     """Rms of noise over what the median of its size `apart` (samples, signals) says; one for normal noise.
 
-    Only what all signals show counts: a logger treats its channels alike, while impacts and friction show in some.
+    Only what all of several signals show counts: a logger treats its channels alike, while impacts and friction show in
+    some. The bends of a hysteresis in a single force are no tails.
     """
     ratios = []
     for column in apart.T:
         around = deviation(column)
         if np.all(around > 0.0):
             ratios.append(float(np.sqrt(np.mean(np.square(np.minimum(column / around, OUTERMOST))))))
-    return max(1.0, min(ratios, default=1.0))
+    return max(1.0, min(ratios)) if len(ratios) > 1 else 1.0

@@ -59,6 +59,11 @@ def test_tails_of_some_readings_only_may_be_impacts() -> None:
     assert found[1] == pytest.approx(1.0, abs=0.04)
 
 
+def test_tails_of_a_single_reading_may_be_the_bends_of_its_motion() -> None:
+    assert residuals.tails(np.abs(heavy(4, 6000, 2))) > 1.05
+    assert residuals.tails(np.abs(heavy(4, 6000, 1))) == 1.0
+
+
 def test_a_motion_that_grows_has_no_tails() -> None:
     t = np.linspace(0.0, 12.0, 6000)
     motion = (np.exp(0.5 * t) * np.sin(12.0 * t))[:, None]
