@@ -157,14 +157,17 @@ def findings(
     Where a logger recorded (`logged`), noise as small as that of its converter is the logger's.
     """
     planned = {name: level for lab in record.labs for name, level in lab.noise.items() if level > 0.0}
-    plain = [name for name in white if name in planned and name not in rounded]
+    read = {
+        name for name in white if np.ptp(record.signals[name]) > 0.0
+    }  # a value that is only known has no noise
+    plain = [name for name in white if name in read & planned.keys() and name not in rounded]
     ratios = {name: white[name] / planned[name] for name in plain}
     usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, LEAST_SCALE)
     result = []
     coarse = coarsest(record, rounded) | resolutions(record, {})
     for name, step in rounded.items():
         noise = planned.get(name, 0.0) * usual
-        if step > max(noise, SAME * coarse.get(name, 0.0)):
+        if step > SAME * max(noise, coarse.get(name, 0.0)):
             size = step / np.sqrt(12.0) / noise if noise > 0.0 else 0.0
             bounds = ((1.0 - STEP_ERROR) * step, (1.0 + STEP_ERROR) * step)
             result.append(SensorFinding(effect_on(record, name, "quantization"), "step", step, bounds, size))
