@@ -13,7 +13,10 @@ from diagnosis.findings import details, how_far, parts_table, rest, where
 from diagnosis.findings.certainty import trust
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.further_tests import exercise, next_test
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.findings.which import which
+from diagnosis.fits import sensor_noise
+from diagnosis.fits.settling import SMALL
 from diagnosis.recorded.nuisances import LoggedForce, LoggedReadings
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import Place, Report, Status, Tolerance
@@ -75,7 +78,7 @@ def status_of(found: Diagnosis) -> Status:
     if outcomes & {"unknown", "partly"}:
         return "partly_explained"
     if not named:
-        return "within_tolerances" if "tolerances" in outcomes else "no_gap"
+        return without_names(found)
     if any(verdict.effects and verdict.probability < 0.5 for verdict in found.verdicts):
         return "ambiguous"
     return "explained"
@@ -89,6 +92,20 @@ def moved(found: Diagnosis) -> bool:
         if not data.part.exact and np.any(level > STILL * np.maximum(data.white, 1e-12)):
             return True
     return False
+
+
+def without_names(found: Diagnosis) -> Status:
+    """The status where no part has a gap of its own and nothing is named."""
+    if any(map(unheard, found.verdicts)):
+        return "not_enough_data"
+    inside = any(verdict.outcome == "tolerances" for verdict in found.verdicts)
+    return "within_tolerances" if inside else "no_gap"
+
+
+def unheard(verdict: PartVerdict) -> bool:
+    """Whether loud noise may be a gap: only the residual tells of it, in a recording too short to ask the inputs."""
+    data = verdict.search.data
+    return data.related is None and sensor_noise.share(data) > SMALL
 
 
 def tolerances(found: Diagnosis) -> dict[str, Tolerance]:

@@ -260,7 +260,7 @@ def unproven(search: Search) -> bool:
         for fit in (before, after)
     ]
     seen = np.array([item.ratio > MATERIAL for item in gaps(before, search.data.group)])
-    own = np.array([item.density is not None and item.source == "residual" for item in search.data.noise])
+    own = np.array([item.unproven for item in search.data.noise])
     if not own.size or not np.any(seen & own):
         return False
     was, is_ = (np.square(rms / search.data.sigma)[seen & own].sum() for rms in left)

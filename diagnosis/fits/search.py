@@ -68,7 +68,7 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
     chosen, better = bare, first
     while better and worth.is_worth(bare, chosen, better[0]):
         best = candidates.exchanged(better[0], scales) if len(better[0].names) > 1 else better[0]
-        chosen = settling.settled(best)
+        chosen = settling.settled(best, bare.data)
         if chosen.data is not bare.data:
             bare, *first = (settling.again(fit, chosen.data) for fit in (bare, *first))
             if len(chosen.names) == 1 and not worth.is_worth(bare, bare, chosen):
@@ -141,13 +141,13 @@ def trimmed(fit: Fit) -> Fit:
 def plainest(search: Search) -> Search:
     """The search with that one in front of as many effects that the data cannot tell from the chosen ones.
 
-    A machine's effect stands before a sensor's, and then the one with the fewest free parameters.
+    A machine's effect stands before a sensor's, then the one with the fewest free parameters, then the likeliest.
     """
     catalogue, chosen = search.data.catalogue, search.chosen
 
-    def order(fit: Fit) -> tuple[int, int]:
+    def order(fit: Fit) -> tuple[int, int, float]:
         artefacts = sum(catalogue[name].kind == "measurement" for name in fit.names)
-        return artefacts, trade.freedom(fit)[0]
+        return artefacts, trade.freedom(fit)[0], fit.cost
 
     same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
     stands = min([chosen, *(item for item in same if tied(chosen, item))], key=order)

@@ -35,8 +35,12 @@ QUIET = 0.1  # below which it is quiet
 ENOUGH = 5.0  # s of quiet windows that suffice
 SHARE = 0.35  # of the windows, the quietest, where fewer than `ENOUGH` seconds are quiet
 SLACK = 0.06  # by which the variance of white noise may differ from that at the highest frequencies
-SURE = 4.0  # standard errors beyond which noise is not white
+SURE = 4.0  # standard errors beyond which noise follows the motion
+# Standard errors beyond which noise is not white: fewer than those of a gap, as unseen colour looks like one.
+WHITE = 3.0
 SLOWER = (1, 4, 16)  # averaged samples in the sums by which that is decided
+# Motion elsewhere over that of the quiet part, from which on noise that is as loud in both does not follow it.
+VARIED = 2.0
 LEAST = 500  # averaged samples without which no flexible model is asked
 LOWER = 0.9  # of the noise first found, from which on a lower one is believed
 
@@ -69,8 +73,8 @@ def modelled(data: Data, system: System) -> Data:
     if data.related is None:
         data = replace(data, related=related(data, system))
     rest = remainder(data, system)
-    quiet, source = quiet_part(data, system)
-    models = tuple(model(data, rest, quiet, source, place) for place in range(len(data.part.signals)))
+    quiet = quiet_part(data, system)
+    models = tuple(model(data, rest, quiet, place) for place in range(len(data.part.signals)))
     white = np.array([item.rms for item in models])
     lines = rest.lines if rest.lines.any() else None
     spiky = rest.spikes if rest.spikes.any() else None
@@ -164,9 +168,12 @@ def whitened(fit: Fit) -> Data:
 
 
 def share(data: Data) -> float:
-    """Largest rms of a coloured noise over that of its reading, of noise that only the residual tells of."""
+    """Largest rms of a coloured noise over that of its reading, of noise that only the residual tells of.
+
+    Noise that is steady while the motion is not does not count: what an effect leaves follows the motion.
+    """
     level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
-    own = [item.density is not None and item.source == "residual" for item in data.noise]
+    own = [item.unproven for item in data.noise]
     ratios = data.white[own] / np.maximum(level[own], 1e-300)
     return float(np.max(ratios, initial=0.0))
 
@@ -230,8 +237,16 @@ def dependencies(part: Part, system: System) -> Array:
     return np.column_stack([*columns, *np.nan_to_num(part.predict(system)).T])
 
 
-def quiet_part(data: Data, system: System) -> tuple[Mask, Source]:
-    """Averaged samples (groups,) in which a part is at rest, or moves least, and which of the two it is."""
+class QuietPart(NamedTuple):
+    """Where a part is at rest, or moves least."""
+
+    there: Mask  # (groups,)
+    source: Source  # which of the two it is
+    varied: float  # rms of the motion elsewhere over that there
+
+
+def quiet_part(data: Data, system: System) -> QuietPart:
+    """The averaged samples in which a part is at rest, or moves least."""
     moving = inputs(data.part, system)
     size = max(1, round(WINDOW / (data.system.plan.test.interval * data.group)))
     count = max(1, data.groups // size)
@@ -247,21 +262,27 @@ def quiet_part(data: Data, system: System) -> tuple[Mask, Source]:
         chosen = level < QUIET
     else:
         chosen, source = level <= np.quantile(level, SHARE), "residual"
-    return np.repeat(chosen, np.diff(edges)), source
+    still, loud = (
+        float(np.mean(np.square(part))) if part.size else 0.0 for part in (level[chosen], level[~chosen])
+    )
+    return QuietPart(np.repeat(chosen, np.diff(edges)), source, math.sqrt(loud / max(still, 1e-300)))
 
 
-def model(data: Data, rest: Remainder, quiet: Mask, source: Source, place: int) -> NoiseModel:
+def model(data: Data, rest: Remainder, part: QuietPart, place: int) -> NoiseModel:
     """The noise of one signal: white where nothing speaks against the level at the highest frequencies."""
+    quiet, source, steady = part.there, part.source, False
     flat = float(data.white[place])
     lines = pickup.named(rest.found[place])
     resolution = float(data.rounded[place])
     segments = stretches(rest.noise[:, place], quiet)
     stepping = resolution > residuals.STEPPING * flat  # counts by itself, and more than noise of its size
-    if stepping or not segments or not np.any(rest.noise[:, place]) or is_white(segments, flat, resolution):
+    if stepping or not segments or not np.any(rest.noise[:, place]):
         return NoiseModel(flat, lines=lines, resolution=resolution)
     if alike(rest.noise[:, place], quiet):
-        quiet, source = np.ones_like(quiet), "residual"
+        quiet, source, steady = np.ones_like(quiet), "residual", part.varied > VARIED
         segments = stretches(rest.noise[:, place], quiet)
+    if is_white(segments, flat, resolution):
+        return NoiseModel(flat, lines=lines, resolution=resolution)
     segments = [piece - piece.mean() for piece in segments]
     density, order = colour.density(segments)
     samples = sum(piece.size for piece in segments)
@@ -269,7 +290,7 @@ def model(data: Data, rest: Remainder, quiet: Mask, source: Source, place: int) 
     tails = heaviness(
         colour.whitened(rest.noise[:, [place]], colour.gains(density, data.groups)[:, None])[quiet, 0]
     )
-    return NoiseModel(rms, "ar", order, source, lines, resolution, density, samples, tails)
+    return NoiseModel(rms, "ar", order, source, lines, resolution, density, samples, tails, steady)
 
 
 def alike(noise: Array, quiet: Mask) -> bool:
@@ -323,7 +344,7 @@ def is_white(segments: list[Array], rms: float, resolution: float) -> bool:
         if every.size < 8:
             continue
         spread = float(np.mean((every - np.median(every)) ** 2)) / max(variance, 1e-300) - 1.0
-        if abs(spread) > SLACK + SURE * math.sqrt(2.0 / every.size):
+        if abs(spread) > SLACK + WHITE * math.sqrt(2.0 / every.size):
             return False
     return True
 

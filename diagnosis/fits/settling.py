@@ -31,11 +31,12 @@ SMALL = (
 UNEVEN = 3.0  # times what the energy of normal noise varies by: such noise comes and goes, as a motion does
 
 
-def settled(fit: Fit) -> Fit:
+def settled(fit: Fit, accepted: Data | None = None) -> Fit:
     """The fit under the noise that it leaves, which is that of its data.
 
     Where much of what it leaves follows from the inputs, the quiet part holds a gap as well as noise: the noise is
-    then taken to be white, of the level of the highest frequencies.
+    then taken to be white, of the level of the highest frequencies. `accepted` are the data with the noise beside
+    other effects, or none.
     """
     if fit.data.part.exact:
         return fit
@@ -52,7 +53,7 @@ def settled(fit: Fit) -> Fit:
     else:
         found = again(found, data)
     if sensor_noise.coloured(data):
-        if not hidden(found):
+        if not hidden(found, accepted):
             return replace(found, data=data) if found.data is not data else found
         data = sensor_noise.remodelled(fit)
         data = replace(data, noise=(), lines=None, spikes=None)
@@ -87,14 +88,14 @@ def again(fit: Fit, data: Data) -> Fit:
     return fitting.at(data, fit.values, fit.z)
 
 
-def hidden(fit: Fit) -> bool:
+def hidden(fit: Fit, accepted: Data | None = None) -> bool:
     """Whether the noise that a fit is measured by may hold a gap.
 
     The inputs foresee more of it than two good solutions of one model differ by; or something is left beside that
     noise, and it is far louder at some frequency than at the highest ones, as the noise of no sensor is; or it comes
-    and goes, or what effects leave would be a large share of a reading.
+    and goes, or what effects leave would be a large share of a reading and is louder than the noise `accepted`.
     """
-    if fit.names and sensor_noise.share(fit.data) > SMALL:
+    if fit.names and sensor_noise.share(fit.data) > SMALL and not no_louder(fit.data, accepted):
         return True
     allowed = model_error(fit)
     least = np.maximum(MATERIAL, allowed)
@@ -105,6 +106,13 @@ def hidden(fit: Fit) -> bool:
     loud = sensor_noise.loudest(fit) > LOUDEST
     uneven = np.array([item.tails > UNEVEN for item in fit.data.noise])
     return seen or bool(np.any(loud & uneven)) or (bool(np.any(loud)) and leaves(fit, allowed))
+
+
+def no_louder(data: Data, accepted: Data | None) -> bool:
+    """Whether the noise of no signal is louder than noise that was accepted, which was coloured too."""
+    if accepted is None or not sensor_noise.coloured(accepted):
+        return False
+    return not bool(np.any(accepted.white < sensor_noise.LOWER * data.white))
 
 
 def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:

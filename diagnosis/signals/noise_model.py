@@ -25,3 +25,9 @@ class NoiseModel:
     density: Array | None = None  # over `colour.GRID`, in the signal's unit squared; None for white noise
     samples: float = math.inf  # averaged samples that its level was found from, infinite for the whole record
     tails: float = 1.0  # how much its energy varies more than that of normal noise
+    steady: bool = False  # whether it is as loud where its part hardly moves as where it moves far more
+
+    @property
+    def unproven(self) -> bool:
+        """Whether only a residual tells of its colour, and one that may follow the motion, as a gap does."""
+        return self.density is not None and self.source == "residual" and not self.steady

@@ -11,13 +11,14 @@ from scipy import signal
 
 from common.recording.imported import IMPORT
 from diagnosis.diagnose import examine
-from diagnosis.findings import logger
+from diagnosis.findings import logger, report
 from diagnosis.findings.found import Diagnosis
-from diagnosis.fits import residuals, sensor_noise
+from diagnosis.fits import residuals, sensor_noise, settling
 from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.record import Record
 from models.registry import Array
+from models.system import System
 from tests.diagnosis.cases import Cases, lab_a
 
 UNKNOWN_TO_A_LOGGER = ("damper_force_used", "column_target", "table_target")
@@ -47,6 +48,13 @@ def hum(values: Array) -> Array:
     """A reading with a hum of 1 % of its peak."""
     wave = np.sin(2.0 * np.pi * 50.0 * 0.002 * np.arange(values.size) + 0.4)
     return values + 0.01 * float(np.max(np.abs(values))) * wave
+
+
+def noisy(values: Array) -> Array:
+    """A reading with noise of its own, low-passed at 100 Hz, of a sixth of its rms."""
+    generator = np.random.default_rng(1 + int(1e9 * abs(float(values[-1]))))
+    noise = signal.lfilter(*FILTER, generator.standard_normal(2 * values.size))[values.size :]
+    return np.asarray(values + np.std(values) / 6.0 * noise / np.std(noise))
 
 
 def delay(whole: Record) -> float:
@@ -90,6 +98,37 @@ def test_a_hum_far_above_the_noise_is_no_gap(cases: Cases) -> None:
 def test_an_effect_keeps_its_name_beside_a_loud_hum(cases: Cases) -> None:
     found = examine(imported(cases.record(FRICTION), hum))
     assert next(item.effects for item in found.verdicts if item.effects) == ("column.friction",)
+
+
+def test_an_effect_keeps_its_name_beside_loud_coloured_noise(cases: Cases) -> None:
+    found = examine(imported(cases.record({"damper.stiffness": {"factor": 0.7}}), noisy))
+    (laboratory,) = (item for item in found.verdicts if item.effects)
+    assert (laboratory.effects, laboratory.outcome) == (("damper.stiffness",), "explained")
+    assert all(item.steady for item in laboratory.search.data.noise)
+
+
+def test_noise_beside_an_effect_is_no_louder_than_the_noise_accepted(cases: Cases) -> None:
+    data = sensor_noise.modelled(
+        residuals.prepare(lab_a(whole := imported(cases.record(), noisy)), whole), System(whole.plan)
+    )
+    assert settling.no_louder(data, data)
+    assert settling.no_louder(replace(data, white=0.9 * data.white), data)
+    assert not settling.no_louder(replace(data, white=1.5 * data.white), data)
+    assert not settling.no_louder(data, replace(data, noise=()))
+    assert not settling.no_louder(data, None)
+
+
+def test_loud_noise_that_may_follow_the_motion_is_too_few_data_where_inputs_cannot_be_asked(
+    cases: Cases,
+) -> None:
+    verdict = examine(imported(cases.record(), noisy)).verdicts[-1]
+    data = verdict.search.data
+    doubtful = replace(data, noise=tuple(replace(item, steady=False) for item in data.noise))
+    heard = [
+        report.unheard(replace(verdict, search=replace(verdict.search, data=one)))
+        for one in (data, doubtful, replace(data, related=None), replace(doubtful, related=None))
+    ]
+    assert heard == [False, False, False, True]
 
 
 def test_noise_that_a_controller_feeds_back_is_not_foreseen_by_commands(cases: Cases) -> None:
