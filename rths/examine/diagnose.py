@@ -148,12 +148,6 @@ def check(args: argparse.Namespace) -> None:
     inputs = [args.file, *args.more, *args.validate, *([cli.plan_path(args.plan)] if args.plan else [])]
     for path in files:
         outputs.checked(path, args.force, inputs)
-    used = [path.resolve() for path in (args.file, *args.more)]
-    for path in args.validate:
-        if path.resolve() in used:
-            raise InputError(f"{path} cannot validate its own diagnosis: give --validate another recording.")
-    if len(set(used)) < len(used):
-        raise InputError(f"A recording is given twice beside {args.file}: name each file once.")
     if args.require is not None and not 0.0 < args.require < math.inf:
         raise InputError(f"--require {args.require:g} cannot be used: give a gap above 0, such as 0.02.")
     if len({outputs.target(path) for path in files}) < len(files):
@@ -228,6 +222,7 @@ def diagnosed(
     from diagnosis.diagnose import diagnose
     from diagnosis.findings.for_prediction.as_reality import as_reality
     from diagnosis.recorded import record
+    from diagnosis.recorded.distinct import refuse_copies
     from diagnosis.recorded.slips import refuse_slips
     from report.gap import wording
 
@@ -245,6 +240,8 @@ def diagnosed(
         {role: [other[role] for other in some if role in other] for role in own}
         for some in (others[: len(more)], others[len(more) :])
     )
+    for role in own:
+        refuse_copies([own[role], *searched[role]], held[role])
     result = {}
     judged = diagnose(own, held, tell, require, searched)
     for role, (report, _) in judged.items():

@@ -15,6 +15,7 @@ from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search
+from diagnosis.recorded.distinct import refuse_copies
 from diagnosis.recorded.joined import JoinedPart, joined, refuse_others
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
@@ -94,3 +95,34 @@ def test_a_cause_in_only_one_of_two_recordings_is_not_accepted(cases: Cases) -> 
     part.candidates = tuple(effect for effect in part.candidates if effect.name in FRICTION)
     data = residuals.prepare(part, stuck)
     assert judged(data, Scales(stuck)).outcome != "explained"
+
+
+def renamed(whole: Record) -> Record:
+    """The same recording under another name."""
+    return replace(whole, run=replace(whole.run, path=whole.run.path.with_name("copy.mcap")))
+
+
+def test_a_copy_under_another_name_neither_validates_nor_adds_evidence(
+    records: tuple[Record, Record],
+) -> None:
+    first, second = records
+    refuse_copies([first], [second])
+    refuse_copies([first, second], [])
+    for copy in (
+        first,
+        renamed(first),
+        replace(renamed(first), ticks=1500),
+    ):  # whole, and its beginning alone
+        with pytest.raises(InputError, match="cannot validate it: give --validate another recording"):
+            refuse_copies([first], [second, copy])
+        with pytest.raises(InputError, match="give each recording once"):
+            refuse_copies([first, copy], [second])
+
+
+def test_another_measurement_of_the_same_test_is_no_copy(
+    cases: Cases, records: tuple[Record, Record]
+) -> None:
+    again = cases.record(duration=4.0, seed=2)
+    name = "table_displacement"
+    assert np.allclose(again.signals[name], records[0].signals[name], atol=1e-4)  # noise and parameters alone
+    refuse_copies([records[0]], [again])

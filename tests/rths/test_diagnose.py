@@ -108,6 +108,11 @@ MISTAKES = {
     "empty file": (["{tmp}/empty.mcap"], "not a readable MCAP recording"),
     "no such plan": (["{file}", "--plan", "nowhere.toml"], "Cannot read the plan nowhere.toml"),
     "no such other": (["{file}", "--validate", "{tmp}/none.mcap"], "Cannot read the recording"),
+    "a copy for validation": (
+        ["{file}", "--validate", "{tmp}/copy.mcap"],
+        "cannot validate it: give --validate",
+    ),
+    "a recording twice": (["{file}", "{tmp}/copy.mcap"], "copy.mcap holds the same readings as"),
     "unwritable report": (["{file}", "--json", "{tmp}/no/a.json"], "There is no folder"),
     "unwritable page": (["{file}", "--html", "{tmp}/no/a.html"], "There is no folder"),
     "one file for both": (
@@ -126,6 +131,7 @@ def test_a_mistake_gives_one_sentence(
     path = cases.file(duration=2.0)
     (tmp_path / "text.mcap").write_text("no recording at all\n")
     (tmp_path / "empty.mcap").write_bytes(b"")
+    (tmp_path / "copy.mcap").write_bytes(path.read_bytes())
     (tmp_path / "head.mcap").write_bytes(path.read_bytes()[:2000])
     words, message = MISTAKES[kind]
     filled = [word.replace("{tmp}", str(tmp_path)).replace("{file}", str(path)) for word in words]
