@@ -13,6 +13,7 @@ from diagnosis.findings import details, how_far, parts_table, rest, where
 from diagnosis.findings.certainty import trust
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.further_tests import exercise, next_test
+from diagnosis.findings.timeless import without_times
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.findings.which import which
 from diagnosis.fits import sensor_noise
@@ -64,7 +65,7 @@ def build(
         parts=parts_table.parts(found, require),
         details=details.details(found, far, named.candidates, tests, signs),
     )
-    return Judged(whole, found)
+    return Judged(without_times(whole, found.record) if found.record.static else whole, found)
 
 
 def status_of(found: Diagnosis) -> Status:

@@ -95,10 +95,10 @@ def outputs(record: Record, names: tuple[str, ...]) -> tuple[Array, Mask]:
 def of_sites(record: Record, sites: Collection[str], plan: Plan) -> tuple[Effect, ...]:
     """The effects at these sites that change a waveform and that the plan's models can have.
 
-    Noise and rounding are left out, since they are found in the samples directly.
+    Noise and rounding are left out, since they are found in the samples directly, and of static data effects on rates.
     """
     found = [effect for effect in record.catalogue.values() if effect.site in sites and effect.fits(plan)]
-    return tuple(effect for effect in found if not effect.in_samples)
+    return tuple(one for one in found if not one.in_samples and not (one.timed and record.static))
 
 
 class LaboratoryPart:

@@ -67,6 +67,11 @@ class Record:
         """The stated properties of the logger's channels, None where rths recorded the test itself."""
         return imported(self.run)
 
+    @property
+    def static(self) -> bool:
+        """Whether its times have no meaning, since only the order of its rows was stated."""
+        return self.stated is not None and self.stated.static
+
     @cached_property
     def catalogue(self) -> dict[str, Effect]:
         """The effects that may act in the part of the test that it shows, by name."""

@@ -22,6 +22,7 @@ class TestFacts(Entry):
     duration: Number = noted("Length of the recording", unit="s", default=None)
     interval: Number = noted("Time between two ticks", unit="s", default=None)
     ticks: int | None = noted("Number of ticks", default=None)
+    static: bool = noted("Whether times have no meaning; all `t` are then numbers of rows", default=False)
     motion: str = noted("Ground motion and its scale", default="")
     outcome: str = noted("How the test ended", default="")
     file: str = noted("Name of the recording's file", default="")

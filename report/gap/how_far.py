@@ -22,12 +22,13 @@ ADEQUATE = {None: MISSING, True: "yes", False: "no"}
 def steps(report: Report) -> list[Drawing]:
     """The waterfall and the worst seconds."""
     details = report.details
+    across = pictures.ROWS if details.test.static else pictures.TIME
     return drawings(
         (pictures.waterfall(details.waterfall), "The overall gap, step by step down to the noise floor."),
         *(
             (
-                pictures.history(item),
-                f"{wording.plain(item.signal).capitalize()} in the seconds of its largest gap, closed loop.",
+                pictures.history(item, across),
+                f"{wording.plain(item.signal).capitalize()} where its gap is largest, closed loop.",
             )
             for item in details.histories[:MOST_HISTORIES]
         ),
@@ -94,7 +95,7 @@ def noises(report: Report) -> Rows:
             "white" if noise.kind == "white" else f"coloured, order {noise.order}",
             ", ".join(f"{line:g} Hz" for line in noise.lines) or MISSING,
             quantity(noise.resolution, noise.unit),
-            {"at rest": "samples at rest", "quiet part": "quiet seconds"}.get(noise.from_, "whole residual"),
+            {"at rest": "samples at rest", "quiet part": "quiet part"}.get(noise.from_, "whole residual"),
         ]
         for part in report.parts
         for name, noise in part.noise_model.items()

@@ -54,7 +54,7 @@ def facts(report: Report) -> str:
     if test.interval is not None:
         found.append(f"interval {quantity(test.interval, 's')}")
     if test.ticks is not None:
-        found.append(f"{test.ticks} ticks")
+        found.append(f"{test.ticks} {'rows' if test.static else 'ticks'}")
     if test.outcome:
         found.append(f"outcome: {test.outcome}")
     return " · ".join(found)

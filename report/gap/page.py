@@ -54,7 +54,7 @@ def named(report: Report) -> dict[str, Any]:
     return {
         "kinds": which.kinds(report),
         "nothing": which.nothing(report),
-        "unknown": which.unknown(unknown) if unknown else None,
+        "unknown": which.unknown(unknown, static=report.details.test.static) if unknown else None,
         "learned": which.learned(report),
         "learned_text": wording.learned(report),
         "predictions": which.predictions(report),

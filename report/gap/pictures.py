@@ -26,6 +26,7 @@ INK = "black"  # becomes the page's own text colour
 GREY = "#808080"
 RECORDED, BEFORE, AFTER = INK, ORANGE, BLUE
 MOST_PARTS = len(COLOURS)
+TIME, ROWS = "time, s", "row"  # abscissas of histories
 LEVEL = "noise"  # beginning of the label of a step that is a level, not a change
 # S around the largest error: eight periods of a building of 2 Hz, in which single cycles can be seen.
 ZOOM = 4.0
@@ -116,7 +117,7 @@ def logarithmic(axis: Any, lowest: float | None = None) -> None:
 
 def residual_time(parts: Sequence[PartSeen]) -> str:
     """Residual over noise of every part over time; empty where no part has windows."""
-    return ratios([(part.site, *pair(part.windows.t, part.windows.ratio)) for part in parts], "time, s")
+    return ratios([(part.site, *pair(part.windows.t, part.windows.ratio)) for part in parts], TIME)
 
 
 def residual_amplitude(parts: Sequence[PartSeen]) -> str:
@@ -178,7 +179,7 @@ def density_unit(part: PartSeen, most: float) -> tuple[float, str]:
 
 
 def worst(t: Values, error: Values) -> slice:
-    """The stretch of `ZOOM` s with the largest error."""
+    """The stretch of `ZOOM` s with the largest error, `t` in s."""
     steps = np.diff(t)
     usual = float(np.nanmedian(steps)) if steps.size else 0.0
     count = round(ZOOM / usual) if usual > 0.0 else t.size
@@ -189,35 +190,39 @@ def worst(t: Values, error: Values) -> slice:
     return slice(begin, begin + count)
 
 
-def prediction(item: Reading) -> str:
+def prediction(item: Reading, across: str = TIME) -> str:
     """A part's reading beside its model's prediction without and with the effect, and the errors of both."""
     models = (
         (item.nominal, BEFORE, "without the effect"),
         (item.corrected, AFTER, "with the effect"),
     )
-    return overlay(item, "measured", item.measured, models, item.noise_floor)
+    return overlay(item, across, models, item.noise_floor)
 
 
-def history(item: History) -> str:
+def history(item: History, across: str = TIME) -> str:
     """A signal of the whole test as recorded, simulated before and after, at the worst seconds."""
     models = ((item.before, BEFORE, "simulated before"), (item.after, AFTER, "simulated after"))
-    return overlay(item, "recorded", item.recorded, models)
+    return overlay(item, across, models)
 
 
 def overlay(
     item: Reading | History,
-    called: str,
-    truth: Series,
+    across: str,
     models: Sequence[tuple[Series, str, str]],
     noise: float | None = None,
 ) -> str:
-    """Curves above, their errors below with the noise floor; empty where nothing is recorded."""
+    """Curves above, their errors below with the noise floor; empty where nothing is recorded.
+
+    `across` names the abscissa; over anything but time all of it is drawn.
+    """
+    called, truth = ("measured", item.measured) if isinstance(item, Reading) else ("recorded", item.recorded)
     t, recorded = pair(item.t, truth)
     if not t.size:
         return ""
     curves = [(values(series), colour, label) for series, colour, label in models]
     drawn = [(curve, colour, label) for curve, colour, label in curves if curve.size == t.size]
-    part = worst(t, drawn[0][0] - recorded) if drawn else slice(0, t.size)
+    timed = bool(drawn) and across == TIME
+    part = worst(t, drawn[0][0] - recorded) if timed else slice(0, t.size)
     factor, unit = scale(float(np.nanmax(np.abs(recorded[part]))), item.unit)
     canvas = figure(WIDTH, 3.2 if drawn else 2.0)
     upper, lower = panels(canvas, bool(drawn))
@@ -227,6 +232,7 @@ def overlay(
         upper.plot(t[part], factor * curve[part], style, color=colour, label=label)
         lower.plot(t[part], factor * (recorded - curve)[part], style, color=colour, linewidth=0.8)
     upper.set_ylabel(literal(f"{wording.plain(item.signal)}\n{unit}"))
+    lower.set_xlabel(across)
     finish_errors(lower, factor, unit, noise, bool(drawn))
     legend(canvas, upper, lower)
     return svg(canvas)
@@ -242,8 +248,7 @@ def panels(canvas: Any, errors: bool) -> tuple[Any, Any]:
 
 
 def finish_errors(axis: Any, factor: float, unit: str, noise: float | None, errors: bool) -> None:
-    """Labels of the lower axes, and the noise floor as a band."""
-    axis.set_xlabel("time, s")
+    """The label of the axes of errors, and the noise floor as a band."""
     if not errors:
         return
     if noise is not None:

@@ -13,18 +13,19 @@ MOST_WINDOWS = 4  # windows of time in a cell of the table
 
 
 def sites(report: Report) -> Rows:
-    """The sites with a gap."""
+    """The sites with a gap; when, and at which frequencies, only where times have a meaning."""
+    static = report.details.test.static
     rows = [
         [
             strong(wording.site(item.site)),
             page.block("share", bar(item.share), percent_interval(item.share_interval)),
             times(item.residual_to_noise),
-            windows(item),
-            lines([span(item.frequency_band, "Hz") or MISSING]),
+            *([] if static else [windows(item), lines([span(item.frequency_band, "Hz") or MISSING])]),
         ]
         for item in report.where
     ]
-    return Rows(("site", "share of the gap", "residual / noise", "when", "frequencies"), rows)
+    over = () if static else ("when", "frequencies")
+    return Rows(("site", "share of the gap", "residual / noise", *over), rows)
 
 
 def unplaced(report: Report) -> str:

@@ -137,15 +137,19 @@ class Strange(NamedTuple):
     drawings: list[Drawing]
 
 
-def unknown(found: Unknown) -> Strange:
-    """The residual of a part that no effect of the catalogue explains, as the page shows it."""
+def unknown(found: Unknown, *, static: bool) -> Strange:
+    """The residual of a part that no effect of the catalogue explains, as the page shows it.
+
+    In `static` data, whose times have no meaning, only the order of the rows is left of them.
+    """
+    words = {"time": "order of the rows"} if static else {}
     facts = []
     if found.amplitude is not None:
         facts.append(f"size {quantity(found.amplitude, found.unit)}")
     if found.frequency is not None:
         facts.append(f"strongest at {quantity(found.frequency, 'Hz')}")
     text = f"At the {wording.site(found.site)} an effect acts that is not in the catalogue"
-    rows = [[str(item.on), bar(item.share)] for item in found.depends_on]
+    rows = [[words.get(item.on, str(item.on)), bar(item.share)] for item in found.depends_on]
     names = ("the catalogue's best", "a flexible curve")
     drawn = pictures.curve(found.curve, names) if found.curve else ""
     return Strange(
@@ -174,11 +178,12 @@ def learned(report: Report) -> list[Drawing]:
 
 def predictions(report: Report) -> list[Drawing]:
     """Measured against predicted, of the parts with the largest residuals first."""
+    across = pictures.ROWS if report.details.test.static else pictures.TIME
     signals = [(part.site, signal) for part in report.details.parts for signal in part.signals]
     signals.sort(key=lambda item: -excess(item[1]))
     return drawings(
         *(
-            (pictures.prediction(signal), caption(name, signal), noise(signal))
+            (pictures.prediction(signal, across), caption(name, signal), noise(signal))
             for name, signal in signals[:MOST_PICTURES]
         )
     )

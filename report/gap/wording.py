@@ -253,7 +253,12 @@ def closed(report: Report) -> str:
 
 def judged_on(report: Report) -> str:
     """The data on which the gap before and after is compared, as the beginning of a sentence."""
-    return JUDGED.get(str(report.how_far.judged_on), "In this recording")
+    return in_rows(report, JUDGED.get(str(report.how_far.judged_on), "In this recording"))
+
+
+def in_rows(report: Report, words: str) -> str:
+    """Words on pieces of a recording, which are rows where times have no meaning."""
+    return words.replace("seconds", "rows") if report.details.test.static else words
 
 
 def learned(report: Report) -> str:
@@ -262,7 +267,7 @@ def learned(report: Report) -> str:
     if far is None:
         return ""
     places = joined([site(name) for name in far.sites])
-    on = LEARNED_ON.get(far.judged_on, far.judged_on)
+    on = in_rows(report, LEARNED_ON.get(far.judged_on, far.judged_on))
     fall = f"from {percent(far.before)} to {percent(far.after)}"
     return (
         f"What no effect explains at the {places} was learned as a law of the motion there: the gap falls {fall} "

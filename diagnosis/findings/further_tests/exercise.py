@@ -1,4 +1,4 @@
-"""Effects that a recording could not have shown, because its motion was too small for them."""
+"""Effects that a recording could not have shown, for its motion was too small or its times mean nothing."""
 
 from __future__ import annotations
 
@@ -30,4 +30,14 @@ def not_exercised(found: Diagnosis) -> tuple[str, ...]:
             change = np.where(data.part.present, (more - whole) / data.sigma, 0.0)
             if float(np.max(np.sqrt(np.mean(change**2, axis=0)))) < SEEN:
                 result.append(effect.name)
-    return tuple(result)
+    return (*result, *untimed(found))
+
+
+def untimed(found: Diagnosis) -> list[str]:
+    """Names of the effects on rates at the sites that were searched, where times have no meaning."""
+    if not found.record.static:
+        return []
+    sites = {effect.site for one in found.verdicts for effect in one.search.data.part.candidates}
+    return [
+        effect.name for effect in found.record.catalogue.values() if effect.timed and effect.site in sites
+    ]

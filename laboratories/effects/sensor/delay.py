@@ -28,4 +28,5 @@ FAULT = ReadingFault(
     ),
     says="the reading comes late",
     reference="reading(t) = value(t − delay)",
+    timed=True,
 )

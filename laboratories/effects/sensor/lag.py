@@ -28,4 +28,5 @@ FAULT = ReadingFault(
     ),
     says="the reading lags behind",
     reference="time_constant·ẏ + y = value",
+    timed=True,
 )

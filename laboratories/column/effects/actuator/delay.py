@@ -33,4 +33,5 @@ EFFECT = Effect(
     parameters=(extra_time("delay", (-0.008, -0.002, 0.002, 0.005, 0.01, 0.02)),),
     reference="Horiuchi, Inoue, Konno, Namita, Earthq. Eng. Struct. Dyn. 28 (1999) 1121-1141",
     apply=apply,
+    timed=True,
 )

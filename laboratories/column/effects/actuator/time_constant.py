@@ -39,4 +39,5 @@ EFFECT = Effect(
     apply=apply,
     actuators=("fopdt",),
     starts=starts,
+    timed=True,
 )

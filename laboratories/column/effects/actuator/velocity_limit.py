@@ -30,4 +30,5 @@ EFFECT = sets(
     },
     says="the piston has a highest speed",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",
+    timed=True,
 )

@@ -21,4 +21,5 @@ EFFECT = sets(
     },
     says="inertia of the moving fixture in the load cell's reading",
     reference="f = f_column + mass·δ̈",
+    timed=True,
 )

@@ -69,4 +69,5 @@ EFFECT = sets(
     ),
     says="force that grows with the rate of deformation",
     reference="f = f_column + coefficient·δ̇",
+    timed=True,
 )
