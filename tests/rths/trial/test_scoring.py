@@ -127,6 +127,17 @@ def test_both_effects_of_a_pair_must_be_in_the_verdict() -> None:
     assert one.why == "reports damper.friction, not damper.friction and column.slip"
 
 
+def test_one_name_is_credited_to_one_effect_of_a_pair() -> None:
+    twins = [["damper.friction", "column.slip"]]
+    one = answer("explained", "damper.friction", site="damper", equivalent=twins)
+    assert judged(case("catalogue", SLIP), one | {"where": [PLACE | {"site": "column"}]}).named
+    outcome = judged(case("pair", RUB, SLIP), one)
+    assert (outcome.named, outcome.listed, outcome.asked) == (False, 1, 2)
+    both = answer("explained", "column.slip", "damper.friction", site="damper", equivalent=twins)
+    outcome = judged(case("pair", RUB, SLIP), both)
+    assert (outcome.named, outcome.listed) == (True, 2)
+
+
 def test_a_clean_laboratory_has_no_gap() -> None:
     assert judged(case("clean"), answer("no_gap")).right
     alarm = judged(case("clean"), answer("explained", "column.slip", site="column"))

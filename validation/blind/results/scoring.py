@@ -131,7 +131,7 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
     right_names = {name for item in case.laid for name in truths(item, names)}
     wrong = [name for name in own if not any(same(item, name, sets) for item in right_names)]
     asked_for = visible(case, recorded)
-    listed = [one for item in asked_for if (one := report_on(item, heard)) and names_it(item, one, names)]
+    listed = credited(asked_for, heard, names)
     named = is_named(case, status, heard, names, asked_for)
     best = best_closed(list(answer.reports.values()), recorded.left)
     closed = min((number(one.closed) for one in asked), default=math.nan)
@@ -217,7 +217,7 @@ def is_named(
     if case.inside and status in QUIET:
         return True
     wanted = asked_for if case.kind == "many" else case.laid
-    return all((one := report_on(item, heard)) and names_it(item, one, names) for item in wanted)
+    return len(credited(wanted, heard, names)) == len(wanted)
 
 
 def is_quiet(case: Case, one: Heard, names: CaseNames) -> bool:
@@ -242,9 +242,33 @@ def is_distortion(case: Case, name: str, names: CaseNames) -> bool:
     return bool(case.logger) and names.faults.get(name) in LOGGERS[case.logger].distortions
 
 
-def names_it(item: Laid, one: Heard, names: CaseNames) -> bool:
-    """Whether a report names an effect."""
-    return any(same(true, name, one.sets) for true in truths(item, names) for name in one.names)
+def credited(wanted: Sequence[Laid], heard: Sequence[Heard], names: CaseNames) -> list[Laid]:
+    """The most effects of these that the reports name, each name counting for one effect only.
+
+    A single name in a set with two hidden effects is one of them. Source: Kuhn, The Hungarian method (1955).
+    """
+    chances = [names_of(item, heard, names) for item in wanted]
+    taken: dict[tuple[str, str], int] = {}
+
+    def finds(place: int, seen: set[tuple[str, str]]) -> bool:
+        for name in chances[place]:
+            if name not in seen:
+                seen.add(name)
+                if name not in taken or finds(taken[name], seen):
+                    taken[name] = place
+                    return True
+        return False
+
+    return [item for place, item in enumerate(wanted) if finds(place, set())]
+
+
+def names_of(item: Laid, heard: Sequence[Heard], names: CaseNames) -> list[tuple[str, str]]:
+    """The names that are right for an effect in the report on its laboratory, each with that report's role."""
+    one = report_on(item, heard)
+    if one is None:
+        return []
+    right = truths(item, names)
+    return [(one.role, name) for name in one.names if any(same(true, name, one.sets) for true in right)]
 
 
 def truths(item: Laid, names: CaseNames) -> set[str]:
