@@ -50,11 +50,12 @@ def placed(report: Report) -> dict[str, Any]:
 
 def named(report: Report) -> dict[str, Any]:
     """What the section on effects takes."""
-    unknown = report.details.unknown
+    details = report.details
+    strange = details.unknowns or ((details.unknown,) if details.unknown else ())
     return {
         "kinds": which.kinds(report),
         "nothing": which.nothing(report),
-        "unknown": which.unknown(unknown, static=report.details.test.static) if unknown else None,
+        "unknowns": [which.unknown(one, static=details.test.static) for one in strange],
         "learned": which.learned(report),
         "learned_text": wording.learned(report),
         "predictions": which.predictions(report),

@@ -168,6 +168,12 @@ def test_pages_state_which_parts_are_absent() -> None:
         assert words in poor
     assert "An effect that the catalogue lacks" in page_of("unknown_effect")
     assert "is not in this report" in page(read(bare("unknown_effect")))
+    report = fresh("unknown_effect")
+    first = report["details"]["unknown"]
+    report["details"]["unknowns"] = [first, {**first, "site": "table", "curve": None}]
+    text = text_of(page(read(report)))
+    assert "Effects that the catalogue lacks" in text
+    assert all(f"At the {site} an effect acts" in text for site in (first["site"], "table"))
 
 
 def texts_replaced(piece: Any, text: str) -> Any:
