@@ -11,7 +11,8 @@ import pytest
 from common.recording.reader import read
 from common.roles import MASTER
 from diagnosis.diagnose import examine
-from diagnosis.findings import gaps, how_far
+from diagnosis.findings import gaps, how_far, where
+from diagnosis.findings.where import SiteTrace
 from diagnosis.recorded import record
 from diagnosis.recorded.loop import closed_share, overall
 from rths.examine.diagnose import diagnose_file
@@ -74,7 +75,12 @@ def test_shares_of_two_sites_sum_to_one(cases: Cases) -> None:
 def test_another_recording_of_the_same_laboratories_is_used_to_judge_the_gap(cases: Cases) -> None:
     effects = FOUND["column"]
     other = cases.file(effects, scale=0.15, duration=8.0)
-    far = diagnose_file(cases.file(effects), validate=[other]).how_far.plain()
+    report = diagnose_file(cases.file(effects), validate=[other]).plain()
+    far, own = report["how_far"], cases.report(effects)
+    assert (
+        report["details"]["waterfall"] == own["details"]["waterfall"]
+    )  # of the recording alone, in every step
+    assert far["after"] != own["how_far"]["after"]
     assert far["judged_on"] == "other recordings"
     assert far["closed"] > 0.9
     assert far["before"] > far["after"]
@@ -131,6 +137,25 @@ def test_a_recording_of_other_parts_judges_nothing_and_says_so(cases: Cases) -> 
 def test_a_falsified_reading_counts_once_in_the_noise_floor(cases: Cases, effects: Effects) -> None:
     far: dict[str, Any] = cases.report(effects, duration=8.0)["how_far"]
     assert far["after"] == pytest.approx(far["noise_floor"], rel=0.15)  # counted twice it is 0.26
+
+
+def test_a_named_site_keeps_its_trace_where_something_is_left_there(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = examine(cases.record(FOUND["column"]))
+    partly = [
+        dataclasses.replace(item, outcome="partly") if item.effects else item for item in found.verdicts
+    ]
+    left = SiteTrace("column", np.ones(3), 1.0, "column_force", 1.0)
+    monkeypatch.setattr(where, "unexplained", lambda *_: left)
+    traces = [
+        item
+        for item in how_far.all_traces(dataclasses.replace(found, verdicts=partly))
+        if item.site == "column"
+    ]
+    assert len(traces) == 1
+    assert traces[0] is not left
+    assert traces[0].ratio > 5.0
 
 
 def test_withheld_time_is_between_15_and_60_percent_of_the_test(cases: Cases) -> None:

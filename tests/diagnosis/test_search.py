@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from diagnosis.fits import candidates, fitting, residuals, unexplained, worth
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import search, together
+from diagnosis.fits.search import search, together, trimmed
 from laboratories.effects import CATALOGUE
 from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, lab_b, named, white
 
@@ -126,6 +128,16 @@ def test_a_search_reports_its_effect_the_explained_share_and_costlier_alternativ
     costs = [item.cost for item in found.alternatives]
     assert costs == sorted(costs)
     assert costs[0] > found.chosen.cost + candidates.TIED
+
+
+def test_no_more_delay_is_taken_away_than_there_is(cases: Cases) -> None:
+    whole = cases.record()
+    data = residuals.prepare(lab_a(whole), whole)
+    there = whole.plan.actuator.delay
+    less = fitting.at(data, {"actuator.delay": {"delay": -3.0 * there}}, np.zeros(len(data.part.nuisances)))
+    assert trimmed(less).values["actuator.delay"]["delay"] == pytest.approx(-there, rel=1e-3)
+    half = replace(less, values={"actuator.delay": {"delay": -0.5 * there}})
+    assert trimmed(half) is half
 
 
 LINKS: dict[str, Effects] = {

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from diagnosis.diagnose import doubted
+from diagnosis.diagnose import doubted, examine
 from diagnosis.findings import where
 from diagnosis.findings.certainty.trust import share_named
+from diagnosis.findings.report import status_of
 from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge
 from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.fitting import Fit
@@ -142,4 +143,15 @@ def test_an_effect_that_is_hardly_the_cause_stands_in_for_it() -> None:
     assert (
         wording.of_part(entry, likely=False)
         == "actuator delay may stand in for another cause and leaves 3.0 % of 10 %"
+    )
+
+
+def test_an_unknown_effect_in_one_part_does_not_hide_the_name_of_another(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = examine(cases.record({"damper.friction": {"force": 3.0}}))
+    strange = [item if item.effects else replace(item, outcome="unknown") for item in found.verdicts]
+    assert status_of(replace(found, verdicts=strange)) == "partly_explained"
+    assert (
+        status_of(replace(found, verdicts=[item for item in strange if not item.effects])) == "unknown_effect"
     )
