@@ -54,6 +54,7 @@ MEMORIES = 3
 # Of Newton's method: its error is below a millionth of the friction as long as that stops the mass, within a segment,
 # over no more than a thousand times the presliding; 200 N on 16 kg do so over 0.8 µm.
 CLIMBS = 7
+ARRIVED = 1e-8  # of the distance: the next step would be its square, below what a number holds
 
 
 class TableLab(NamedTuple):
@@ -304,5 +305,8 @@ def bent(matrix: Array, scratch: Array, length: float, least: float, most: float
     moved = max(far / (1.0 + lost / presliding), far - lost)
     for _ in range(CLIMBS):
         left = np.exp(-moved / presliding)
-        moved -= (moved - far + lost * (1.0 - left)) / (1.0 + lost / presliding * left)
+        step = (far - moved - lost * (1.0 - left)) / (1.0 + lost / presliding * left)
+        moved += step
+        if abs(step) < ARRIVED * moved:
+            break
     return friction.dahl(force, moved if ahead > 0.0 else -moved, least, most, presliding)
