@@ -231,16 +231,17 @@ def closed_interval(
     energy = []
     for block in ids:
         mask = own.mask & (places == block)
+        there = {name: mask & own.record.present[name] for name in own.gap(after)}
         row = []
         for simulated in (before, after):
             errors = [
-                own.record.signals[name][mask] - simulated[name][mask]
+                own.record.signals[name][seen] - simulated[name][seen]
                 if simulated is not None
-                else own.record.signals[name][mask] * loop.DIVERGED
-                for name in own.gap(simulated)
+                else own.record.signals[name][seen] * loop.DIVERGED
+                for name, seen in there.items()
             ]
-            row += [float(np.sum(error**2)) for error in errors]
-        row += [float(np.sum(own.record.signals[name][mask] ** 2)) for name in own.gap(after)]
+            row += [float(np.sum(np.square(error))) for error in errors]
+        row += [float(np.sum(np.square(own.record.signals[name][seen]))) for name, seen in there.items()]
         energy.append(row)
     table = np.array(energy)
     random = np.random.default_rng(0)
@@ -248,8 +249,13 @@ def closed_interval(
     count = table.shape[1] // 3
     for _ in range(DRAWS):
         sums = table[random.integers(0, len(table), len(table))].sum(axis=0)
-        scale = np.maximum(sums[2 * count :], 1e-300)
-        b, a = (float(np.sqrt(np.mean(sums[i * count : (i + 1) * count] / scale))) for i in (0, 1))
+        level = sums[
+            2 * count :
+        ]  # none where a reading with coarse steps stood still all the time: it has no gap then
+        shares = np.divide(
+            sums[: 2 * count].reshape(2, count), level, where=level > 0.0, out=np.zeros((2, count))
+        )
+        b, a = np.sqrt(shares.mean(axis=1)).tolist()
         values.append(closed_share(b, a, floor))
     return float(np.percentile(values, 5)), float(np.percentile(values, 95))
 

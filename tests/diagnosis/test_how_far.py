@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,25 @@ def test_the_right_effect_closes_the_gap_down_to_the_noise(cases: Cases, kind: s
         (far["before"] - far["after"]) / (far["before"] - far["noise_floor"]), rel=1e-6
     )
     assert far["judged_on"] == "interleaved (interpolation)"
+
+
+def test_a_reading_that_stood_still_over_a_stretch_leaves_the_interval_finite() -> None:
+    motion = np.sin(0.1 * np.arange(6000))
+    force = np.where(np.arange(6000) < 3000, 0.0, motion)  # steps that are coarser than the motion
+    signals = {"motion": motion, "force": force}
+    record = SimpleNamespace(
+        plan=SimpleNamespace(test=SimpleNamespace(interval=0.002)),
+        ticks=6000,
+        signals=signals,
+        present={name: np.ones(6000, dtype=bool) for name in signals},
+    )
+    own = SimpleNamespace(
+        record=record, mask=np.ones(6000, dtype=bool), gap=lambda _: dict.fromkeys(signals, 1.0)
+    )
+    before, after = (dict.fromkeys(signals, share * motion) for share in (0.5, 0.9))
+    low, high = how_far.closed_interval(own, before, after, 0.0)  # type: ignore[arg-type]
+    assert low <= high
+    assert np.isfinite([low, high]).all()
 
 
 def test_the_waterfall_decreases_site_by_site(cases: Cases) -> None:
