@@ -47,6 +47,7 @@ NEARLY = 1.5
 # kind than the planned one left 9 to 30 %.
 MUCH = 0.05
 LONG = 20  # steps of such a fit
+BEYOND = 2.0  # times the largest force measured: a slider's own one is passed on before it slides
 TOGETHER = 2  # of such fits, those that are fitted to their end
 STIFFNESS = "column.stiffness"  # what a law with the planned stiffness has beside it where that is wrong
 OTHERWISE = 1.25  # factor on the planned stiffness beyond which a law of yielding does not find its own way
@@ -242,7 +243,23 @@ def coupled(fit: Fit, best: Fit) -> list[Fit]:
     known = sorted((item for item in starts if item[1] and item[0] < NEARLY * left), key=lambda item: item[0])
     begun = [fitting.at(fit.data, fit.values | values, np.zeros(fit.z.size)) for _, values in known[:FITTED]]
     leading = sorted(begun, key=cost)[:TOGETHER]
-    return sorted((settled(fitted(item, LONG, ROUNDS)) for item in leading), key=cost)
+    done = (settled(fitted(item, LONG, ROUNDS)) for item in leading)
+    return sorted((item for item in done if works(item, float(np.max(np.abs(way[1]))))), key=cost)
+
+
+def works(fit: Fit, force: float) -> bool:
+    """Whether all forces that effects of a fit need to act lie within `BEYOND` times the largest one measured, N.
+
+    A slider that never slides is a spring, which stands in for what bends.
+    """
+    catalogue = fit.data.catalogue
+    forces = [
+        values[item.name]
+        for name, values in fit.values.items()
+        for item in catalogue[name].parameters
+        if item.unit == "N" and not item.shape and item.null == 0.0
+    ]
+    return all(abs(value) <= BEYOND * force for value in forces)
 
 
 def beside(fit: Fit, effect: Effect, place: int, found: SpecimenFit) -> Values:

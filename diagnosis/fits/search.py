@@ -49,21 +49,22 @@ def search(data: Data, scales: Scales) -> Search:
         bare, first = settling.instead_of_colour(bare, scales)
     if first:
         first = sorted([*laws.coupled(bare, first[0]), *first], key=lambda fit: fit.cost)
-    bare, chosen, first = selected(bare, first, scales)
+    bare, chosen, first, beside = selected(bare, first, scales)
     if not chosen.names:
         return Search(bare.data, bare, chosen, ())
+    before = chosen
     chosen, as_good = trade.traded(bare, pruned(bare, chosen), first, scales, MOST)
     if remaining(chosen) < worth.LOUD:  # what leaves more has not found its largest effects yet
-        chosen = together(chosen, scales)
+        chosen = together(chosen, scales, beside if chosen is before else None)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
-    return plainest(Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others))))
+    return plainest(likeliest(Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others)))))
 
 
-def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, list[Fit]]:
+def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, list[Fit], list[Fit] | None]:
     """The fit without effects, the one with all effects that are worth it, and those with one, under one noise.
 
-    `first` are the fits with one effect, best first. As the noise follows from what is left, it may change with every
-    effect.
+    The last are fits with one effect more, none of them worth it, where they were tried. `first` are the fits with one
+    effect, best first. As the noise follows from what is left, it may change with every effect.
     """
     chosen, better = bare, first
     while better and worth.is_worth(bare, chosen, better[0]):
@@ -72,22 +73,23 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
         if chosen.data is not bare.data:
             bare, *first = (settling.again(fit, chosen.data) for fit in (bare, *first))
             if len(chosen.names) == 1 and not worth.is_worth(bare, bare, chosen):
-                return bare, bare, first
+                return bare, bare, first, None
         if len(chosen.names) >= MOST or worth.enough(bare, chosen):
-            break
+            return bare, chosen, first, None
         better = candidates.best_laws(chosen, scales)
-    return bare, chosen, first
+    return bare, chosen, first, better
 
 
-def together(chosen: Fit, scales: Scales) -> Fit:
+def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fit:
     """The effects chosen with further ones where all together leave nothing that can be seen; else those chosen.
 
     Beside an effect of a thousand times the noise, one of twenty times the noise explains too little of the whole gap
     to be worth it, and so nothing behind it is found either. But effects that are not there hardly leave only noise.
+    `beside` are fits with one effect more, best first, where they are known already.
     """
     fit = chosen
     while leaves(fit) and len(fit.names) < TOGETHER:
-        further = candidates.best_laws(fit, scales)
+        further = beside if fit is chosen and beside is not None else candidates.best_laws(fit, scales)
         if not further or excess(further[0]) > (1.0 - STEP_OF_LEFT) * excess(fit):
             break
         fit = further[0]
@@ -136,6 +138,20 @@ def trimmed(fit: Fit) -> Fit:
             if most < 1.0:
                 given[item.name] = item.null + most * (given[item.name] - item.null)
     return replace(fit, values=values) if values != fit.values else fit
+
+
+def likeliest(search: Search) -> Search:
+    """The search with that one in front of as many effects that is far likelier than the chosen ones.
+
+    The effects beside an exchanged one were chosen before it, so that a further exchange may still pay.
+    """
+    chosen = search.chosen
+    same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
+    best = min(same, key=lambda fit: fit.cost, default=chosen)
+    if best.cost > chosen.cost - candidates.TIED or remaining(best) > remaining(chosen):
+        return search
+    rest = [chosen, *(item for item in search.alternatives if item is not best)]
+    return replace(search, chosen=best, alternatives=tuple(rest))
 
 
 def plainest(search: Search) -> Search:

@@ -84,6 +84,10 @@ def refines(bare: Fit, before: Fit, after: Fit) -> bool:
     """
     left, saved = excess(before), excess(before) - excess(after)
     whole = min(excess(bare), bare.data.energy)
-    if remaining(before) > LOUD:  # far from any noise a model may well be refined in small steps
-        return saved > STEP_OF_REST * left and saved > STEP_OF_WHOLE * whole
-    return (saved > REST * left and saved > TRACE * whole) or (saved > HALF * left and saved > SHARE * whole)
+    # far from any noise a model may well be refined in small steps
+    steps = saved > STEP_OF_REST * left and saved > STEP_OF_WHOLE * whole and remaining(before) > LOUD
+    return (
+        steps
+        or (saved > REST * left and saved > TRACE * whole)
+        or (saved > HALF * left and saved > SHARE * whole)
+    )

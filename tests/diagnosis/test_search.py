@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from diagnosis.fits import candidates, fitting, residuals, unexplained, worth
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import search, together, trimmed
+from diagnosis.fits.search import Search, likeliest, search, together, trimmed
 from laboratories.effects import CATALOGUE
 from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, lab_b, named, white
 
@@ -168,7 +169,7 @@ def test_a_reading_that_saturates_is_also_looked_for_above_what_was_reached(case
 
 
 def test_an_effect_that_is_small_beside_another_is_named_where_both_leave_only_noise(cases: Cases) -> None:
-    effects = {"damper.offset": {"force": 40.0}, "table.gain": {"factor": 0.97}}
+    effects = {"damper.offset": {"force": 40.0}, "table.gain": {"factor": 0.99}}
     found = cases.record(effects, duration=8.0)
     part = lab_b(found)
     part.candidates = tuple(one for one in part.candidates if one.name in {*effects, "damper.viscous"})
@@ -177,3 +178,29 @@ def test_an_effect_that_is_small_beside_another_is_named_where_both_leave_only_n
     assert not worth.refines(fitting.fit(data, {}), alone, fitting.fit(data, effects))
     assert set(together(alone, scales).names) == set(effects)
     assert set(together(fitting.fit(data, effects), scales).names) == set(effects)
+
+
+@pytest.mark.parametrize(("left", "refines"), [(6.0, True), (4e5, False)])
+def test_an_effect_that_leaves_hardly_anything_is_worth_it_however_large_the_whole_gap(
+    monkeypatch: pytest.MonkeyPatch, left: float, refines: bool
+) -> None:
+    excess = {"bare": 2e9, "one": 9e5, "two": left}
+    monkeypatch.setattr(worth, "excess", lambda fit: excess[fit.name])
+    monkeypatch.setattr(worth, "remaining", lambda _: 2.0 * worth.LOUD)
+    bare, one, two = (SimpleNamespace(name=name, data=SimpleNamespace(energy=4e9)) for name in excess)
+    assert worth.refines(bare, one, two) is refines  # type: ignore[arg-type]
+
+
+def test_a_far_likelier_exchange_of_one_effect_stands_in_front(cases: Cases) -> None:
+    found = cases.record({"damper.viscous": {"factor": 1.5}}, duration=8.0)
+    data = residuals.prepare(lab_b(found), found)
+    bare = fitting.fit(data, {})
+    true, wrong = (
+        fitting.fit(data, {name: {"factor": 1.2}}) for name in ("damper.viscous", "damper.stiffness")
+    )
+    ordered = likeliest(Search(data, bare, wrong, (true,)))
+    assert (ordered.chosen, ordered.alternatives) == (true, (wrong,))
+    known = Search(data, bare, true, (wrong,))
+    assert likeliest(known) is known
+    more = replace(known, chosen=wrong, alternatives=(fitting.at(data, true.values | wrong.values, true.z),))
+    assert likeliest(more) is more
