@@ -41,6 +41,8 @@ STRAINED = 3.0
 # set "tune" and on effects of no catalogue stand-ins explained 0.59 to 0.93 of it where no nominal parameter was at its
 # bound, true mechanisms 0.95 to 1.00.
 REST = 0.06
+# Share of a gap's energy beyond any that these stand-ins explained.
+NEARLY = 0.99
 # Stand-ins per true name among the verdicts that leave nothing: 5 of 78 were wrong (docs/reference/blind.md).
 FALSE = 0.06
 # Distance from the bound, in tolerances, within which a nominal parameter counts as pinned to it.
@@ -77,9 +79,7 @@ def judge(search: Search) -> PartVerdict:
         outcome = without_effects(bare)
         return PartVerdict(bare, outcome, 1.0, (), (), doubted=name if outcome == "unknown" else "")
     outcome = how_well(search)
-    if outcome == "unknown" or (
-        outcome == "partly" and (strain(search) < HALF or artefact(search) or misplaced(search))
-    ):
+    if outcome == "unknown" or (outcome == "partly" and imitated(search)):
         return unnamed(search)
     chances = odds(search)
     same = [tied(search.chosen, other) for other in search.alternatives]
@@ -204,8 +204,13 @@ def how_well(search: Search) -> Outcome:
 
 
 def imitated(search: Search) -> bool:
-    """Whether effects that leave something are too doubtful to be named at all."""
-    return strain(search) < HALF or artefact(search) or misplaced(search)
+    """Whether effects that leave something are too doubtful to be named at all.
+
+    Where nominal parameters give way so far that what they explain says little for the effects, these are named if they
+    explain nearly all of a gap: beside another formula of the true effect the parameters take what is left.
+    """
+    stretched = strain(search) < HALF and search.explained < NEARLY
+    return stretched or artefact(search) or misplaced(search)
 
 
 def artefact(search: Search) -> bool:

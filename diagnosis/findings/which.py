@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -31,17 +31,13 @@ class Named(NamedTuple):
 
 
 def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Named:
-    """The candidates, the verdict's with the probability `sure` at most, and warnings on the verdict's parameters.
-
-    Where something is left, what the `signs` of the verdict make of it is the most.
-    """
+    """The candidates, the verdict's with the probability `sure` at most, and warnings on the verdict's parameters."""
     named = [verdict for verdict in found.verdicts if verdict.effects]
     effects = [name for verdict in named for name in verdict.effects]
     effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
     likely = float(np.prod([verdict.probability for verdict in found.verdicts]))
-    if effects and any(verdict.outcome in ("partly", "unknown") for verdict in found.verdicts):
-        shares = [trust.share_named(item.search.explained) for item in named if item.outcome == "partly"]
-        likely = min(likely, trust.PARTLY.probability(signs), *shares)
+    if effects:
+        likely = trusted(found, named, signs, likely)
     probability = min(sure, likely)
     if not effects:
         probability = min(probability, nothing(found))
@@ -59,6 +55,20 @@ def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Na
     ends = [warning for name, values in fits.items() for warning in at_the_end(catalogue[name], values)]
     as_good = [sentence for verdict in named for sentence in other_numbers(verdict)]
     return Named((first, *others[:MOST_OTHERS]), (*ends, *as_good))
+
+
+def trusted(
+    found: Diagnosis, named: Sequence[PartVerdict], signs: Mapping[str, float], costs: float
+) -> float:
+    """Probability of the effects named by what was learned of such verdicts, at most that by their costs.
+
+    Where something is left, costs say only how near the alternatives are, and what is left is a limit.
+    """
+    if all(verdict.outcome not in ("partly", "unknown") for verdict in found.verdicts):
+        return min(costs, trust.EXPLAINED.probability(signs))
+    near = float(np.prod([trust.share_likeliest(verdict) for verdict in named]))
+    shares = [trust.share_named(item.search.explained) for item in named if item.outcome == "partly"]
+    return min(near, trust.PARTLY.probability(signs), *shares)
 
 
 def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:

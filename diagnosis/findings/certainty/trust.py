@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import REST
+from diagnosis.findings.verdict import REST, PartVerdict
 from diagnosis.fits import worth
 from diagnosis.fits.unexplained import MATERIAL, remaining
 
@@ -34,14 +34,20 @@ class Weights(NamedTuple):
         return 1.0 / (1.0 + math.exp(-odds))
 
 
-# Of verdicts that leave something ("partly"), from 24 of them (docs/reference/blind.md). Of those that leave nothing no
-# sign told the wrong ones: there the probability follows from costs alone (`verdict.DOUBT`).
-PARTLY = Weights(-0.61, {"clear": 0.47, "names": -0.71})
+# Of 113 verdicts that leave nothing and of 33 that leave something ("partly"): docs/reference/blind.md.
+EXPLAINED = Weights(2.93, {"clear": 0.0805, "names": -0.719})
+PARTLY = Weights(-0.569, {"clear": 0.225, "names": -0.113})
 
 
 def share_named(explained: float) -> float:
     """Probability that the effects named are the true ones, by the share of a gap's energy that they explain."""
     return REST / (REST + max(1.0 - explained, 0.0))
+
+
+def share_likeliest(verdict: PartVerdict) -> float:
+    """Probability of the effects that a verdict names, if one of it and of the alternatives to it is right."""
+    others = sum(chance for _, chance in verdict.others)
+    return verdict.probability / max(verdict.probability + others, 1e-300)
 
 
 def signs(found: Diagnosis) -> dict[str, float]:
