@@ -11,7 +11,7 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search
 from models.system import System
-from tests.diagnosis.test_laws import INTERVAL, NOISE, TICKS, MadeSpecimen
+from tests.diagnosis.specimens import INTERVAL, NOISE, TICKS, MadeSpecimen
 
 GROUP, TRAIN = residuals.withheld(TICKS, INTERVAL)
 LEVEL = np.array([NOISE])

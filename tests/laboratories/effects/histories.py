@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from common.plan.laboratory_tables import Actuator, Column, Damper, ShakingTable
 from laboratories.column import model as column_lab
+from laboratories.column import specimen
 from laboratories.table import linear
 from laboratories.table import model as table_lab
 from models.system import ActuatorEffects, ColumnEffects, DamperEffects, TableEffects
@@ -86,3 +87,18 @@ def phasor(values: Array, t: Array, frequency: float, after: float) -> complex:
     count = round(cycles_ / (frequency * DT))
     turning = np.exp(-2j * np.pi * frequency * t[-count:])
     return complex(2.0 * np.mean(values[-count:] * turning))
+
+
+def specimen_under(
+    path: Array, effects: ColumnEffects, step: float = SHORT, column: Column | None = None
+) -> Array:
+    """Force at each deformation of a path, from rest at its first point."""
+    parts = specimen.build(column or Column(stiffness=K), effects)
+    return np.array([specimen.force(parts, float(deformation), step) for deformation in path])
+
+
+def cycles(amplitude: float, frequency: float, count: int = 3) -> tuple[Array, Array]:
+    """Times and deformations of a sine, in short steps, whole cycles."""
+    steps = round(1.0 / (frequency * SHORT))
+    t = np.arange(count * steps + 1) * SHORT
+    return t, amplitude * np.sin(2.0 * np.pi * frequency * t)

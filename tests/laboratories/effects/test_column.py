@@ -17,22 +17,7 @@ from common.plan.laboratory_tables import Column
 from laboratories.column import specimen
 from models.specimens.fit import forces
 from models.system import ColumnEffects
-from tests.laboratories.effects.histories import DT, SHORT, Array, K, run_a, tones
-
-
-def specimen_under(
-    path: Array, effects: ColumnEffects, step: float = SHORT, column: Column | None = None
-) -> Array:
-    """Force at each deformation of a path, from rest at its first point."""
-    parts = specimen.build(column or Column(stiffness=K), effects)
-    return np.array([specimen.force(parts, float(deformation), step) for deformation in path])
-
-
-def cycles(amplitude: float, frequency: float, count: int = 3) -> tuple[Array, Array]:
-    """Times and deformations of a sine, in short steps, whole cycles."""
-    steps = round(1.0 / (frequency * SHORT))
-    t = np.arange(count * steps + 1) * SHORT
-    return t, amplitude * np.sin(2.0 * np.pi * frequency * t)
+from tests.laboratories.effects.histories import DT, SHORT, Array, K, cycles, run_a, specimen_under, tones
 
 
 def last_loop(path: Array, force: Array, frequency: float) -> float:
@@ -359,42 +344,6 @@ def test_the_work_of_falling_friction_by_quadrature_agrees_with_the_loop() -> No
 
     expected = 4.0 * quad(power, 0.0, 0.25 / frequency)[0]
     assert last_loop(path, specimen_under(path, more), frequency) == pytest.approx(expected, rel=3e-3)
-
-
-def test_a_viscous_column_may_depend_on_a_power_of_the_rate() -> None:
-    _, path = cycles(2e-3, 1.0)
-    speed = np.diff(path, prepend=path[0]) / SHORT
-    more = ColumnEffects(viscous=4e4, viscous_law=1.0, viscous_exponent=0.4)
-    expected = K * path + 4e4 * 0.1 * np.sign(speed) * (np.abs(speed) / 0.1) ** 0.4
-    assert np.allclose(specimen_under(path, more), expected, rtol=1e-9, atol=1e-6)
-
-
-@pytest.mark.parametrize("exponent", [0.3, 1.0, 1.6])
-def test_a_dashpot_behind_a_spring_solves_maxwells_equation(exponent: float) -> None:
-    _, path = cycles(2e-3, 1.0, 1)
-    more = ColumnEffects(viscous=4e5, viscous_law=2.0, viscous_exponent=exponent, viscous_stiffness=2e7)
-
-    def rate(t: float, f: Array) -> Array:
-        size = 0.1 * (np.abs(f) / (4e5 * 0.1)) ** (1.0 / exponent)
-        return np.asarray(2e7 * (2e-3 * 2.0 * np.pi * np.cos(2.0 * np.pi * t) - np.sign(f) * size))
-
-    times = np.arange(path.size) * SHORT
-    exact = solve_ivp(rate, (0.0, times[-1]), [0.0], t_eval=times, method="LSODA", rtol=1e-8, atol=1e-2).y[0]
-    got = specimen_under(path, more)
-    assert np.max(np.abs(got - exact)) < 0.02 * np.max(np.abs(exact))
-
-
-def test_a_dashpot_behind_a_spring_beside_the_specimen_solves_maxwells_equation() -> None:
-    _, path = cycles(2e-3, 1.0, 1)
-    stiffness, relaxation, h, f = 3e6, 0.03, SHORT, 0.0
-    exact = [0.0]
-    for moved in np.diff(path):  # exact for a constant rate
-        fade = math.exp(-h / relaxation)
-        f = fade * f + stiffness * moved * relaxation / h * (1.0 - fade)
-        exact.append(f)
-    more = ColumnEffects(viscous=stiffness * relaxation, viscous_law=3.0, viscous_stiffness=stiffness)
-    got = specimen_under(path, more) - K * path
-    assert np.max(np.abs(got - np.array(exact))) < 0.02 * np.max(np.abs(exact))
 
 
 def test_one_law_alone_takes_the_place_of_the_planned_specimen() -> None:
