@@ -234,13 +234,13 @@ def closed_interval(
         there = {name: mask & own.record.present[name] for name in own.gap(after)}
         row = []
         for simulated in (before, after):
-            errors = [
+            apart = [
                 own.record.signals[name][seen] - simulated[name][seen]
                 if simulated is not None
                 else own.record.signals[name][seen] * loop.DIVERGED
                 for name, seen in there.items()
             ]
-            row += [float(np.sum(np.square(error))) for error in errors]
+            row += [float(np.sum(np.square(error))) for error in apart]
         row += [float(np.sum(np.square(own.record.signals[name][seen]))) for name, seen in there.items()]
         energy.append(row)
     table = np.array(energy)
@@ -249,12 +249,9 @@ def closed_interval(
     count = table.shape[1] // 3
     for _ in range(DRAWS):
         sums = table[random.integers(0, len(table), len(table))].sum(axis=0)
-        level = sums[
-            2 * count :
-        ]  # none where a reading with coarse steps stood still all the time: it has no gap then
-        shares = np.divide(
-            sums[: 2 * count].reshape(2, count), level, where=level > 0.0, out=np.zeros((2, count))
-        )
+        errors, level = sums[: 2 * count].reshape(2, count), sums[2 * count :]
+        # A reading with coarse steps may have stood still all the time: it has no gap then.
+        shares = np.divide(errors, level, where=level > 0.0, out=np.zeros((2, count)))
         b, a = np.sqrt(shares.mean(axis=1)).tolist()
         values.append(closed_share(b, a, floor))
     return float(np.percentile(values, 5)), float(np.percentile(values, 95))

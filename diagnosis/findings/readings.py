@@ -157,9 +157,8 @@ def findings(
     Where a logger recorded (`logged`), noise as small as that of its converter is the logger's.
     """
     planned = {name: level for lab in record.labs for name, level in lab.noise.items() if level > 0.0}
-    read = {
-        name for name in white if np.ptp(record.signals[name]) > 0.0
-    }  # a value that is only known has no noise
+    # A value that is only stated has no noise.
+    read = {name for name in white if np.ptp(record.signals[name]) > 0.0}
     plain = [name for name in white if name in read & planned.keys() and name not in rounded]
     ratios = {name: white[name] / planned[name] for name in plain}
     usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, LEAST_SCALE)

@@ -60,9 +60,10 @@ def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Na
 def trusted(
     found: Diagnosis, named: Sequence[PartVerdict], signs: Mapping[str, float], costs: float
 ) -> float:
-    """Probability of the effects named by what was learned of such verdicts, at most that by their costs.
+    """Probability of the effects named by what was learned of such verdicts.
 
-    Where something is left, costs say only how near the alternatives are, and what is left is a limit.
+    Where nothing is left, the probability by `costs` is the most. Where something is left, costs only tell the effects
+    from the alternatives to them, and the share of the gap that is left lowers the probability.
     """
     if all(verdict.outcome not in ("partly", "unknown") for verdict in found.verdicts):
         return min(costs, trust.EXPLAINED.probability(signs))

@@ -34,7 +34,7 @@ class Weights(NamedTuple):
         return 1.0 / (1.0 + math.exp(-odds))
 
 
-# Of 113 verdicts that leave nothing and of 33 that leave something ("partly"): docs/reference/blind.md.
+# Learned from 113 verdicts that leave nothing and from 33 that leave something (docs/reference/blind.md).
 EXPLAINED = Weights(2.93, {"clear": 0.0805, "names": -0.719})
 PARTLY = Weights(-0.569, {"clear": 0.225, "names": -0.113})
 
