@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from common.plan.plan import Plan
 from diagnosis.findings.verdict import equivalents
-from diagnosis.fits import residuals
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search
-from models.system import System
-from tests.diagnosis.specimens import INTERVAL, NOISE, TICKS, MadeSpecimen
+from tests.diagnosis.specimens import MadeSpecimen, data_of
 
-GROUP, TRAIN = residuals.withheld(TICKS, INTERVAL)
-LEVEL = np.array([NOISE])
-DATA = Data(MadeSpecimen(), System(Plan()), LEVEL, LEVEL, GROUP, TRAIN, np.zeros(1))
+DATA = data_of(MadeSpecimen())
 NOISY = np.random.default_rng(3).standard_normal((DATA.groups, 1))
 
 
