@@ -18,9 +18,13 @@ class ActuatorEffects:
 
     velocity_limit: float = math.inf  # m/s
     backlash: float = 0.0  # m, whole play
-    backlash_law: float = 0.0  # 0 behind the loop, between piston and specimen, 1 before the loop
+    backlash_law: float = (
+        0.0  # 0 behind the loop, between piston and specimen, 1 before the loop, 2 behind, greased
+    )
+    spring_back: float = 0.01  # s, in which a specimen springs back through greased play
     compliance: float = 0.0  # m/N
     deadband: float = 0.0  # m, whole band of the loop's error without flow
+    deadband_law: float = 0.0  # 0 with sharp edges, 1 with edges that leak
     learned: tuple[float, ...] = ()  # a law of `models.preisach` that adds to the motion, m
 
 

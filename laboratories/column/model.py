@@ -33,14 +33,16 @@ FINE_SUBSTEP = 0.05e-3
 SETTLING = 1.0  # s, in which `begin` ramps servo-hydraulics to a command, and in which they then settle
 
 # places in `state`: the lag's piston before compliance and play m, specimen m, load cell N, command behind a play
-# before the loop m, states of servo-hydraulics
-SERVO, DISPLACEMENT, FORCE, PLAYED, STATES = range(5)
+# before the loop m, piston from specimen within a greased play m, states of servo-hydraulics
+SERVO, DISPLACEMENT, FORCE, PLAYED, LOOSE, STATES = range(6)
 
 # places in `limits`; for servo-hydraulics GAIN is that of the command, and VELOCITY_LIMIT is given as a flow
 PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, HYDRAULIC, BEYOND, BEFORE = (
     range(11)
 )
-BEFORE_LOOP = 1.0  # the law of `actuator.backlash` with the play between command and loop
+SPRING_BACK, LEAKING = range(11, 13)
+# laws of `actuator.backlash`: the play between command and loop, and greased play behind the loop
+BEFORE_LOOP, GREASED = 1.0, 2.0
 
 
 class ColumnLab(NamedTuple):
@@ -87,7 +89,7 @@ def build(
         segments.taps,
         rows,
         segments.lengths,
-        np.array([*limits, 0.0, 0.0, before]),
+        np.array([*limits, 0.0, 0.0, before, *formulas(on_actuator)]),
         np.zeros(segments.memory),
         np.zeros(STATES),
         specimen.build(column, on_column),
@@ -101,6 +103,11 @@ def plays(effects: ActuatorEffects) -> tuple[float, float]:
     if effects.backlash_law == BEFORE_LOOP:
         return effects.backlash, 0.0
     return 0.0, effects.backlash
+
+
+def formulas(effects: ActuatorEffects) -> tuple[float, float]:
+    """The time (s) in which a specimen springs back through play, 0 where it is dry, and whether an overlap leaks."""
+    return effects.spring_back if effects.backlash_law == GREASED else 0.0, effects.deadband_law
 
 
 def hydraulic(
@@ -132,6 +139,7 @@ def hydraulic(
     segments = delay.split(interval, servo.delay, steps, held=held)
     limits = [float(limited), on_actuator.velocity_limit * servo.piston, 0.0, on_actuator.compliance]
     limits += [on_actuator.deadband, servo.gain, column.stiffness, float(held), 1.0, float(beyond), 0.0]
+    limits += formulas(on_actuator)
     return ColumnLab(
         segments.taps,
         servo_hydraulic.propagators(a, b, segments.lengths),
@@ -203,7 +211,7 @@ def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
             ahead = first_order.step(rows[i], servo, before, after)
             if limits[PRESENT] != 0.0:
                 servo += limited(limits, ahead - servo, 0.5 * (before + after), servo, lengths[i])
-                displacement = loaded(limits, servo, displacement, cell[REACTION])
+                displacement = loaded(limits, state, servo, displacement, cell[REACTION], lengths[i])
             else:
                 servo = ahead
                 displacement = ahead
@@ -231,7 +239,16 @@ def overlapped(limits: Array, state: Array, command: float) -> float:
         state[STATES + servo_hydraulic.POSITION] + limits[COMPLIANCE] * state[STATES + servo_hydraulic.FORCE]
     )
     error = limits[GAIN] * command - piston
-    return min(max(error, -half), half) / limits[GAIN]
+    return blocked(limits, error) / limits[GAIN]
+
+
+@jit
+def blocked(limits: Array, error: float) -> float:
+    """Part of an error of the loop (m) that the valve's overlap keeps from the flow."""
+    half = 0.5 * limits[DEADBAND]
+    if limits[LEAKING] != 0.0:
+        return half * math.tanh(error / half)
+    return min(max(error, -half), half)
 
 
 @jit
@@ -248,23 +265,31 @@ def choked(limits: Array, state: Array) -> None:
 @jit
 def limited(limits: Array, way: float, command: float, servo: float, length: float) -> float:
     """Displacement of the piston (m) within a segment of `length` s, from that of a valve without overlap or limit."""
-    error = abs(limits[GAIN] * command - servo)
-    half = 0.5 * limits[DEADBAND]
-    if half > 0.0:
-        way *= max(error - half, 0.0) / error if error > 0.0 else 0.0
+    error = limits[GAIN] * command - servo
+    if limits[DEADBAND] > 0.0:
+        way *= (error - blocked(limits, error)) / error if error != 0.0 else 0.0
     longest = limits[VELOCITY_LIMIT] * length
     return min(max(way, -longest), longest)
 
 
 @jit
-def loaded(limits: Array, servo: float, displacement: float, reaction: float) -> float:
+def loaded(
+    limits: Array, state: Array, servo: float, displacement: float, reaction: float, length: float
+) -> float:
     """Deformation (m) of the specimen where the piston gives way by `c·f` and the clevis has play.
 
     The force at the new deformation is taken as `reaction + k·Δδ` with the specimen's initial stiffness, which is exact
-    for a linear specimen and late by one short step for a yielding one.
+    for a linear specimen and late by one short step for a yielding one. Greased play is an implicit step of `length` s.
     """
     compliance, stiffness = limits[COMPLIANCE], limits[STIFFNESS]
     pushed = servo - compliance * (reaction - stiffness * displacement)
-    wanted = pushed / (1.0 + compliance * stiffness)
-    half = 0.5 * limits[BACKLASH] / (1.0 + compliance * stiffness)
-    return min(max(displacement, wanted - half), wanted + half)
+    stiffer = 1.0 + compliance * stiffness
+    wanted = pushed / stiffer
+    half = 0.5 * limits[BACKLASH] / stiffer
+    if limits[SPRING_BACK] == 0.0 or half == 0.0:
+        return min(max(displacement, wanted - half), wanted + half)
+    slow = limits[SPRING_BACK] / length
+    drawn = reaction / stiffness + wanted - displacement
+    loose = min(max((slow * state[LOOSE] + drawn) / (slow * stiffer + 1.0), -half), half)
+    state[LOOSE] = loose * stiffer
+    return wanted - loose

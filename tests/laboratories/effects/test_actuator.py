@@ -19,21 +19,24 @@ DIRECT = Actuator(gain=1.0, delay=0.0, time_constant=0.0)
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.9])
+@pytest.mark.parametrize("leaking", [0.0, 1.0], ids=["sharp", "leaking"])
 @pytest.mark.parametrize(
     ("limit", "band"), [(0.02, 0.0), (math.inf, 4e-4), (0.03, 4e-4)], ids=["limit", "band", "both"]
 )
 def test_the_servo_loop_solves_its_equation_with_limit_and_dead_band(
-    limit: float, band: float, gain: float
+    limit: float, band: float, leaking: float, gain: float
 ) -> None:
     actuator = Actuator(gain=gain, delay=0.0133, time_constant=0.030)
     command = tones(400, size=1.5e-3)
-    more = ActuatorEffects(velocity_limit=limit, deadband=band)
+    more = ActuatorEffects(velocity_limit=limit, deadband=band, deadband_law=leaking)
     got = run_a(command, actuator, actuator_effects=more)[:, 0]
     reached = ramped(command, 0.0133)
 
     def slope(t: float, y: Array) -> Any:
         error = gain * reached(t) - y
-        return np.clip((error - np.clip(error, -band / 2, band / 2)) / 0.030, -limit, limit)
+        half = band / 2
+        blocked = half * np.tanh(error / half) if leaking and band else np.clip(error, -half, half)
+        return np.clip((error - blocked) / 0.030, -limit, limit)
 
     times = DT * np.arange(1, command.size + 1)
     exact = solve_ivp(slope, (0, times[-1]), [0.0], t_eval=times, max_step=DT / 8, rtol=1e-8, atol=1e-12).y[0]
@@ -84,6 +87,25 @@ def test_play_before_the_loop_holds_back_its_command_and_then_lets_it_settle(com
     behind = run_a(command, actuator, actuator_effects=ActuatorEffects(backlash=width))[:, 0]
     assert np.max(np.abs(got - behind)) > 0.1 * width  # there is something to be told apart
     assert np.max(np.abs(got - exact[fine - 1 :: fine])) < 2e-3 * np.max(np.abs(exact))
+
+
+@pytest.mark.parametrize("compliance", [0.0, 3e-8])
+@pytest.mark.parametrize("spring_back", [2e-3, 0.02])
+def test_the_force_of_a_specimen_moves_it_through_greased_play(compliance: float, spring_back: float) -> None:
+    """Its relaxation is that of a spring and a dashpot between stops, solved in steps of 12.5 µs."""
+    width, fine, command = 2e-4, 160, tones(400, size=1.5e-3)
+    more = ActuatorEffects(backlash=width, backlash_law=2.0, spring_back=spring_back, compliance=compliance)
+    got = run_a(command, DIRECT, actuator_effects=more)[:, 0]
+    loose, exact = 0.0, []
+    for piston in map(ramped(command, 0.0), DT / fine * np.arange(1, fine * command.size + 1)):
+        deformation = (piston - loose) / (1.0 + compliance * K)
+        loose = min(max(loose + DT / fine * deformation / spring_back, -width / 2), width / 2)
+        exact.append((piston - loose) / (1.0 + compliance * K))
+    dry = run_a(command, DIRECT, actuator_effects=ActuatorEffects(backlash=width, compliance=compliance))
+    assert np.max(np.abs(got - dry[:, 0])) > 0.1 * width  # there is something to be told apart
+    assert (
+        np.max(np.abs(got - exact[fine - 1 :: fine])) < 0.03 * width
+    )  # of implicit steps of an eighth of the shorter time
 
 
 @given(compliance=st.floats(1e-9, 3e-8))

@@ -2,14 +2,18 @@
 
     T·ẏ = e − clip(e, −width/2, +width/2),    e = K·u(t − L) − y
 
-`width` is the whole band, both signs together. Not to be confused with `actuator.backlash`, a play with
+`width` is the whole band, both signs together. With `law` 1 the edges of the overlap leak, so that the band is round:
+
+    T·ẏ = e − width/2·tanh(2·e/width)
+
+Not to be confused with `actuator.backlash`, a play with
 memory behind the piston: the dead band leaves a slow creep short of the target.
 """
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Parameter
-from laboratories.effects.laws import sets
+from laboratories.effects.effect import Law, Parameter
+from laboratories.effects.laws import sets, which_law
 
 EFFECT = sets(
     "actuator",
@@ -25,6 +29,8 @@ EFFECT = sets(
             says="whole band of the error",
         ),
     },
+    further={"deadband_law": which_law(1.0, "0 with sharp edges, 1 with edges that leak")},
+    laws=(Law("sharp", {}), Law("leaking", {})),
     says="small errors of the loop cause no flow",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",
 )
