@@ -79,6 +79,11 @@ class Data:
         present = self.part.present
         return present if self.spikes is None else present & ~self.spikes[: len(present)]
 
+    @property
+    def beside(self) -> Array:
+        """Variance (signals,) that residuals may have beside the noise: of what a model errs by, and of rounding."""
+        return np.asarray(self.sigma**2 - self.white**2)
+
     @cached_property
     def factors(self) -> Array | None:
         """Factors (groups, signals) on the residuals' spectra that make the noise white; None where it is white."""
@@ -87,10 +92,8 @@ class Data:
         columns = np.ones((self.groups, self.sigma.size))
         for place, item in enumerate(self.noise):
             if item.density is not None:
-                others = (
-                    self.sigma[place] ** 2 - self.white[place] ** 2
-                )  # what a model may err by, and rounding
-                columns[:, place] = self.sigma[place] * colour.gains(item.density + others, self.groups)
+                density = item.density + self.beside[place]
+                columns[:, place] = self.sigma[place] * colour.gains(density, self.groups)
         return columns
 
     def averaged(self, raw: Array) -> Array:

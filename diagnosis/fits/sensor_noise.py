@@ -287,9 +287,8 @@ def model(data: Data, rest: Remainder, part: QuietPart, place: int) -> NoiseMode
     density, order = colour.density(segments)
     samples = sum(piece.size for piece in segments)
     rms = float(rest.single[:, place][np.repeat(quiet, data.group)].std())
-    tails = heaviness(
-        colour.whitened(rest.noise[:, [place]], colour.gains(density, data.groups)[:, None])[quiet, 0]
-    )
+    gains = colour.gains(density + data.beside[place], data.groups)[:, None]
+    tails = heaviness(colour.whitened(rest.noise[:, [place]], gains)[quiet, 0])
     return NoiseModel(rms, "ar", order, source, lines, resolution, density, samples, tails, steady)
 
 

@@ -126,10 +126,12 @@ class LaboratoryPart:
         ]
         sites += [machine.site for machine in machines if self.shows(record, machine)]
         self.candidates = of_sites(record, set(map(lab.site, sites)), lab.plan)
-        self.anew = self.beginnings(record)
         command = self.inputs[next(iter(self.inputs))]
         first, most = command[0], np.max(np.abs(command))
         self._start = float(first) if abs(first) > UNREST * most else 0.0
+        self.anew = self.beginnings(record)
+        if self.anew is not None and not lab.kind.drifts(lab.plan) and self.rested(record.systems[lab.role]):
+            self.anew = None
 
     def targets(self, record: Record) -> dict[str, Array]:
         """What moves the laboratory, by command, without the noise of its sensors that a controller feeds back.
@@ -186,6 +188,19 @@ class LaboratoryPart:
             cubic = np.polynomial.polynomial.polyfit((window - tick) * interval, motion[window], 3)
             rows.append((tick, cubic[0], cubic[1]))
         return np.array(rows)
+
+    def rested(self, system: System) -> bool:
+        """Whether a replay from rest is nearer to the motion than one from the state that was read.
+
+        Noise of a tenth of the motion looks like a beginning in motion, and a rate that is read from it is any rate.
+        """
+        place = self.signals.index(self.lab.signal(self.lab.kind.free))
+        read, there = self.measured[:, place], self.present[:, place]
+        moving, still = (
+            float(np.sum(np.square(read - part.predict(system)[:, place])[there]))
+            for part in (self, self.replaced(anew=None))
+        )
+        return still < moving
 
     def first(self, ticks: int) -> LaboratoryPart:
         """The laboratory over the first ticks."""

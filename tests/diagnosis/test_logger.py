@@ -19,7 +19,7 @@ from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.record import Record
 from models.registry import Array
 from models.system import System
-from tests.diagnosis.cases import Cases, lab_a
+from tests.diagnosis.cases import Cases, lab_a, lab_b
 
 UNKNOWN_TO_A_LOGGER = ("damper_force_used", "column_target", "table_target")
 FILTER = signal.butter(4, 100.0, fs=500.0)  # before the converter, Hz
@@ -129,6 +129,30 @@ def test_loud_noise_that_may_follow_the_motion_is_too_few_data_where_inputs_cann
         for one in (data, doubtful, replace(data, related=None), replace(doubtful, related=None))
     ]
     assert heard == [False, False, False, True]
+
+
+def test_a_loud_first_sample_is_no_beginning_in_motion(cases: Cases) -> None:
+    def jumping(values: Array) -> Array:
+        return values + 0.1 * np.max(np.abs(values)) * (-0.9) ** np.arange(values.size)
+
+    whole = cases.record()
+    assert lab_b(imported(whole, jumping)).anew is None
+    signals = {name: values[whole.ticks // 2 :] for name, values in whole.signals.items()}
+    present = {name: there[whole.ticks // 2 :] for name, there in whole.present.items()}
+    later = lab_b(replace(whole, signals=signals, present=present))
+    assert later.anew is not None
+    assert len(later.anew) == 1
+
+
+def test_noise_without_any_at_the_highest_frequencies_does_not_come_and_go(cases: Cases) -> None:
+    whole, generator = imported(cases.record()), np.random.default_rng(5)
+    part, system = lab_a(whole), System(whole.plan)
+    smooth = signal.butter(8, 20.0, fs=500.0, output="sos")
+    said = part.predict(system)
+    noise = signal.sosfilt(smooth, generator.standard_normal((4096 + len(said), 2)), axis=0)[4096:]
+    part = part.replaced(measured=said + 0.05 * np.std(said, axis=0) * noise)
+    data = sensor_noise.modelled(residuals.prepare(part, whole), system)
+    assert all(item.steady and item.tails < settling.UNEVEN for item in data.noise)
 
 
 def test_noise_that_a_controller_feeds_back_is_not_foreseen_by_commands(cases: Cases) -> None:
