@@ -15,7 +15,8 @@ from common.plan.kinds import COLUMN
 from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Problem, Values
-from diagnosis.fits.screening import WORKERS
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.screening import WORKERS, Plane, ScreenedEffect
 from diagnosis.fits.unexplained import remaining
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
@@ -48,6 +49,7 @@ NEARLY = 1.5
 MUCH = 0.05
 LONG = 20  # steps of such a fit
 BEYOND = 2.0  # times the largest force measured: a slider's own one is passed on before it slides
+WEAKER, GRID = 0.25, 8  # times the least size of a search: where a grid over the sizes begins, and its points
 TOGETHER = 2  # of such fits, those that are fitted to their end
 STIFFNESS = "column.stiffness"  # what a law with the planned stiffness has beside it where that is wrong
 OTHERWISE = 1.25  # factor on the planned stiffness beyond which a law of yielding does not find its own way
@@ -192,6 +194,48 @@ def starts(
     ways = itertools.product(NEARER.tolist(), shapes(fit, effect, place), stiff(fit, effect, law))
     for share, shape, spring in ways:
         yield base | shape | spring | {strength.name: within(strength, share * base[strength.name])}
+
+
+def unlike_first(fit: Fit, scales: Scales) -> list[ScreenedEffect]:
+    """What effects promise over a fit under laws behind their first, best first.
+
+    Each is laid at a grid of starts: play behind a loop looks like no size of play before it, and what it does is no
+    straight line in its parameters. Models of specimens are left out, which follow force over deformation.
+    """
+    plane = Plane(fit)
+    ways = [
+        (effect, place)
+        for effect in fit.data.part.candidates
+        for place, law in enumerate(effect.laws)
+        if place and not law.model and effect.name not in fit.names
+    ]
+
+    def promised(effect: Effect, values: dict[str, float]) -> ScreenedEffect:
+        change = (
+            fitting.at(fit.data, fit.values | {effect.name: values}, fit.z).reduced - fit.reduced
+        ).ravel()
+        gain, _, z = plane.gain(change, scales.stretch(effect))
+        return ScreenedEffect(effect, values, z, gain)
+
+    def best(way: tuple[Effect, int]) -> list[ScreenedEffect]:
+        found = [promised(way[0], values) for values in gridded(fit, *way, scales)]
+        return sorted(found, key=lambda item: -item.gain)[:1]
+
+    with ThreadPoolExecutor(WORKERS) as pool:
+        found = [item for items in pool.map(best, ways) for item in items]
+    return sorted(found, key=lambda item: -item.gain)
+
+
+def gridded(fit: Fit, effect: Effect, place: int, scales: Scales) -> Iterator[dict[str, float]]:
+    """Parameters from which a law may start where nothing is known of its effect, from weak to strong."""
+    (strength,) = (item for item in effect.parameters if not item.shape)
+    sizes = [values[strength.name] for _, values in scales.starts(effect)]
+    if not sizes or min(sizes) <= 0.0:
+        return
+    for size in np.geomspace(WEAKER * min(sizes), max(sizes), GRID).tolist():
+        base = effect.under(place, effect.values({strength.name: within(strength, size)}))
+        for shape in shapes(fit, effect, place):
+            yield base | shape
 
 
 def as_specimen(

@@ -43,10 +43,10 @@ class Search:
 def search(data: Data, scales: Scales) -> Search:
     """Commission a part, select effects one by one, exchange and prune them, and fit what else might be."""
     bare = settling.settled(fitting.fit(data, {}))
-    if worth.is_gap(bare):
-        first = candidates.best_laws(bare, scales)
-    else:
-        bare, first = settling.instead_of_colour(bare, scales)
+    first = candidates.best_laws(bare, scales) if worth.is_gap(bare) else []
+    if not (first and worth.is_worth(bare, bare, first[0])):  # under noise that is a gap no effect shows
+        bare, instead = settling.instead_of_colour(bare, scales)
+        first = instead or first
     if first:
         first = sorted([*laws.coupled(bare, first[0]), *first], key=lambda fit: fit.cost)
     bare, chosen, first, beside = selected(bare, first, scales)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.fits import evidence, fitting, sensor_noise
+from diagnosis.fits import candidates, evidence, fitting, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
@@ -105,7 +105,12 @@ def hidden(fit: Fit, accepted: Data | None = None) -> bool:
     )
     loud = sensor_noise.loudest(fit) > LOUDEST
     uneven = np.array([item.tails > UNEVEN for item in fit.data.noise])
-    return seen or bool(np.any(loud & uneven)) or (bool(np.any(loud)) and leaves(fit, allowed))
+    return seen or bool(np.any(loud & uneven)) or (is_loud(fit) and leaves(fit, allowed))
+
+
+def is_loud(fit: Fit) -> bool:
+    """Whether the noise that a fit is measured by is far louder at some frequency than that of a sensor."""
+    return bool(np.any(sensor_noise.loudest(fit) > LOUDEST))
 
 
 def no_louder(data: Data, accepted: Data | None) -> bool:
@@ -125,6 +130,8 @@ def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
     if not sensor_noise.coloured(bare.data):
         return bare, []
     fits = in_white_noise(bare, scales)
+    if fits and is_loud(bare) and not far_likelier(remodelled(fits[0]), bare):
+        fits = candidates.best_laws(fitting.at(sensor_noise.whitened(bare), {}, bare.z), scales)
     if not fits or not far_likelier(remodelled(fits[0]), bare):
         return bare, []
     best, bare = settled(fits[0]), as_near(bare, fits[0])

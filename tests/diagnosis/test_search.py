@@ -14,11 +14,14 @@ from diagnosis.fits.search import Search, likeliest, search, together, trimmed
 from laboratories.effects import CATALOGUE
 from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, lab_b, named, white
 
+# play behind the loop, of which the law of play before the loop promises nothing
+PLAYED = {"width": 1.5e-4, "contact": 200.0, "flank": 0.7, "guide": 628.0, "law": 1.0}
 ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth, relative error allowed
     ("ground.scale", {"factor": 1.08}, {"factor": 0.005}),
     ("structure.mass", {"factor": 1.1}, {"factor": 0.05}),
     ("actuator.backlash", {"width": 2e-4}, {"width": 0.05}),
     ("actuator.backlash", {"width": 2e-4, "law": 1.0}, {"width": 0.05, "law": 0.0}),
+    ("table.backlash", PLAYED, {"width": 0.05, "law": 0.0}),
     ("actuator.delay", {"delay": 6e-3}, {"delay": 0.1}),  # the plan's own delay is known to 0.28 ms only
     ("column.friction", {"force": 900.0}, {"force": 0.05}),
     ("column.yielding", {"yield_displacement": 1.2e-3, "hardening": 0.1}, {"yield_displacement": 0.05}),
