@@ -17,7 +17,7 @@ from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Problem, Values
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import WORKERS, Plane, ScreenedEffect
-from diagnosis.fits.unexplained import remaining
+from diagnosis.fits.unexplained import leaves, remaining
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
 from laboratories.effects.effect import Effect, Law, Parameter
@@ -262,11 +262,11 @@ def coupled(fit: Fit, best: Fit) -> list[Fit]:
 
     They are a slider behind play, and a law of yielding whose first stiffness is not the planned one. One by one such
     effects explain little, so that a search does not reach them: without its play a slider reverses too early. They are
-    tried where much of the force is left, and where the model follows the measured force about as well as the best fit
-    known, or better.
+    tried where much of the force is left and more than noise, and where the model follows the measured force about as
+    well as the best fit known, or better.
     """
     way = path(fit.data.part)
-    if way is None:
+    if way is None or not leaves(best):
         return []
     residual = best.data.residual(hypothesis.lay(best.data, best.z, best.values))[:, -1]  # of the force
     left = float(np.sqrt(np.mean(np.square(residual)) / np.mean(np.square(way[1]))))

@@ -14,13 +14,13 @@ the intervals then describe how sharp the minimum is, not how much another colum
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
 from common.errors import InputError
@@ -37,6 +37,9 @@ FOLLOWED = 600
 EVALUATIONS = (
     50  # largest number of steps to a minimum: a start that has not come near it by then is given up
 )
+# After how many steps starts are held against each other, and how many are followed on: most lead to the same few
+# minima. Of 50 fits of paths of laboratories A two then ended in one that leaves 1 to 2.6 % more, none in a better one.
+RACES = ((8, 6), (20, 3))
 CONFIDENCE = 0.95
 WEAKEST = (
     1e-13  # least eigenvalue of the normal matrix over its largest: smaller ones are rounding of a double
@@ -187,10 +190,7 @@ def fit(
     trials = [np.clip(x, low, high) for x in starting_points(model, units, start)]
     ranked = sorted(trials, key=lambda x: float(np.sum(misfit(x) ** 2)))
     chosen = ranked[: max(2, FOLLOWED // len(ranges) ** 2)]
-    found = [
-        least_squares(misfit, x, bounds=(low, high), x_scale="jac", max_nfev=EVALUATIONS) for x in chosen
-    ]
-    best = min(found, key=lambda solution: float(solution.cost))
+    best = followed(misfit, chosen, low, high)
     values = parameters(model, best.x, units)
     gap = forces(model, values, path) - measured
     return SpecimenFit(
@@ -199,6 +199,21 @@ def fit(
         math.sqrt(float(np.mean(gap**2))) / rms,
         intervals(model, np.asarray(best.x), units, np.asarray(best.jac), 2.0 * float(best.cost)),
     )
+
+
+def followed(
+    misfit: Callable[[Array], Array], starts: list[Array], low: Array, high: Array
+) -> OptimizeResult:
+    """The least minimum that starts lead to, the hopeless ones given up on the way."""
+
+    def after(steps: int) -> list[OptimizeResult]:
+        found = [least_squares(misfit, x, bounds=(low, high), x_scale="jac", max_nfev=steps) for x in starts]
+        return sorted(found, key=lambda solution: float(solution.cost))
+
+    for steps, kept in RACES:
+        if len(starts) > kept:
+            starts = [solution.x for solution in after(steps)[:kept]]
+    return after(EVALUATIONS)[0]
 
 
 def record(model: str, deformation: Array, force: Array) -> tuple[Array, Array]:

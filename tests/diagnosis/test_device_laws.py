@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,16 @@ def test_a_friction_damper_with_play_is_friction_and_slip_whatever_stiffness_is_
     assert friction["asymmetry"] == pytest.approx(-0.2, abs=0.01)
     assert slip["gap"] == pytest.approx(part.PLAY, rel=0.05)
     assert found.chi < 1.2 * found.reduced.size
+
+
+def test_no_effects_of_one_model_are_tried_beside_a_fit_that_leaves_only_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    data = data_of(FrictionDamper())
+    bare = fitting.fit(data, {})
+    quiet = replace(bare, reduced=np.random.default_rng(1).standard_normal(bare.reduced.shape))
+    monkeypatch.setattr(laws, "following", None)
+    assert laws.coupled(bare, quiet) == []
 
 
 class FluidDamper(FrictionDamper):

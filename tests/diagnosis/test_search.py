@@ -22,6 +22,12 @@ ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth
     ("actuator.backlash", {"width": 2e-4}, {"width": 0.05}),
     ("actuator.backlash", {"width": 2e-4, "law": 1.0}, {"width": 0.05, "law": 0.0}),
     ("table.backlash", PLAYED, {"width": 0.05, "law": 0.0}),
+    (
+        "actuator.backlash",
+        {"width": 2e-4, "law": 2.0, "spring_back": 6e-3},
+        {"width": 0.05, "spring_back": 0.1},
+    ),
+    ("actuator.deadband", {"width": 4e-4, "law": 1.0}, {"width": 0.05, "law": 0.0}),
     ("actuator.delay", {"delay": 6e-3}, {"delay": 0.1}),  # the plan's own delay is known to 0.28 ms only
     ("column.friction", {"force": 900.0}, {"force": 0.05}),
     ("column.yielding", {"yield_displacement": 1.2e-3, "hardening": 0.1}, {"yield_displacement": 0.05}),
