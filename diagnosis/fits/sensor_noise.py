@@ -295,15 +295,17 @@ def model(data: Data, rest: Remainder, part: QuietPart, place: int) -> NoiseMode
 def alike(noise: Array, quiet: Mask) -> bool:
     """Whether noise (groups,) is no louder where the part moves more: all of it then tells its colour.
 
-    The variances of its sums over time are held against each other; that of slow sums, and of noise that is correlated,
-    is known least.
+    The variances of its sums over time are held against each other, whitened by the colour of the whole: of slow noise,
+    which hardly forgets, two stretches differ by chance. That of slow sums is known least.
     """
+    whole = colour.density([noise - noise.mean()])[0]
+    white = colour.whitened(noise[:, None], colour.gains(whole, noise.size)[:, None])[:, 0]
     for size in SLOWER:
-        still, loud = (summed(stretches(noise, mask), size) for mask in (quiet, ~quiet))
+        still, loud = (summed(stretches(white, mask), size) for mask in (quiet, ~quiet))
         if min(still.size, loud.size) < 8:
             continue
         more = float(np.var(loud)) / max(float(np.var(still)), 1e-300) - 1.0
-        one = 2.0 * repeated(summed([noise], size))
+        one = 2.0 * repeated(summed([white], size))
         if more > SURE * math.sqrt(one / still.size + one / loud.size):
             return False
     return True

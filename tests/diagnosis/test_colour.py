@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from diagnosis.fits import sensor_noise
 from diagnosis.fits.unexplained import gap
 from diagnosis.signals import colour, pickup
 from diagnosis.signals.ceiling import Crosswise
@@ -71,6 +72,24 @@ def test_noise_of_any_colour_does_not_count_as_a_gap(name: str) -> None:
     assert gap(flat, GROUP, model).significance < 5.0
     assert np.var(flat) == pytest.approx(1.0, abs=0.15)
     assert np.abs(np.corrcoef(flat[1:], flat[:-1])[0, 1]) < 0.1
+
+
+def test_the_ends_of_whitened_noise_are_as_loud_as_the_rest() -> None:
+    smooth = signal.butter(8, 20.0, fs=RATE, output="sos")
+    noise = averaged(np.asarray(signal.sosfilt(smooth, white(14, TICKS))[4000:]))
+    flat, _ = whitened(noise, [noise])
+    assert np.max(np.abs(flat)) < 5.0
+    assert sensor_noise.heaviness(flat) < 1.2
+
+
+def test_slow_noise_is_alike_in_two_stretches_and_a_motion_in_one_of_them_is_not() -> None:
+    quiet = np.arange(1500) % 187 < 70
+    band = signal.butter(2, (0.05, 0.2), "band")
+    for seed in range(15, 20):
+        noise = averaged(white(seed, 6000)) + np.cumsum(white(seed + 10, 1500)) / 5.0
+        motion = np.where(quiet, 0.1, 1.0) * np.asarray(signal.lfilter(*band, white(seed + 20, 1500)))
+        assert sensor_noise.alike(noise, quiet)
+        assert not sensor_noise.alike(noise + 5.0 * motion, quiet)
 
 
 @pytest.mark.parametrize("name", ["50 Hz", "AR(1)", "pink"])
