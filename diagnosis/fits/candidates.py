@@ -37,10 +37,11 @@ TIED = 9.0  # cost by which hypotheses differ that can be told apart: 3 standard
 def extended(fit: Fit, scales: Scales, count: int = FITTED, known: Fit | None = None) -> list[Fit]:
     """Fits with one effect more, best first: all a few steps over a beginning, the best of them to their end.
 
-    Those that leave far more than the best, or than a fit that is `known`, stay as they are after a few steps.
+    Those that leave far more than the best, or than a fit that is `known`, stay as they are after a few steps. Beside a
+    known fit effects are looked at under their first laws only: those under others are too far away to come near it.
     """
     data, near = fit.data, fitting.begun(fit)
-    promising = promised(near, scales)[:count]
+    promising = (promised(near, scales) if known is None else screened(near, scales))[:count]
     slopes = near.jacobian[:, : fit.z.size]
 
     def rough(candidate: ScreenedEffect) -> Fit:
@@ -68,12 +69,17 @@ def extended(fit: Fit, scales: Scales, count: int = FITTED, known: Fit | None = 
     return fits
 
 
+def screened(near: Fit, scales: Scales) -> list[ScreenedEffect]:
+    """What all effects promise over a fit under their first laws, best first."""
+    return screen(near, near.data.part.candidates, scales)
+
+
 def promised(near: Fit, scales: Scales) -> list[ScreenedEffect]:
     """What effects promise over a fit, best first: each under its first law, or another one that promises far more.
 
     Other laws are looked at only where no effect promises much under its first.
     """
-    found = screen(near, near.data.part.candidates, scales)
+    found = screened(near, scales)
     most = max((item.gain for item in found), default=0.0)
     if most > LITTLE * excess(near):
         return found
