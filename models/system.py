@@ -45,6 +45,7 @@ class ColumnEffects:
         1.0  # and its place: on the way to the peak, of the peak, or of where it unloads to
     )
     damage: float = 0.0  # growth of that peak per plastic deformation of the yield displacement
+    yield_asymmetry: float = 0.0  # strength of its positive side less that of the negative one over their sum
     centring: float = math.inf  # m, deformation where a self-centring specimen bends
     centring_hardening: float = 0.05
     centring_loop: float = 0.5  # height of its flag over its force there

@@ -27,6 +27,7 @@ OF_YIELDING = (
     "pinch_force",
     "pinch_displacement",
     "damage",
+    "yield_asymmetry",
 )
 OF_CENTRING = ("centring", "centring_hardening", "centring_loop")
 

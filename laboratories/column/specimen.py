@@ -166,7 +166,7 @@ def yielding(stiffness: float, effects: ColumnEffects) -> Array:
         return np.array(skeleton)
     if name.startswith("pinched"):
         corner = [effects.pinch_force, effects.pinch_displacement]
-        return np.array([*skeleton, *corner, effects.unloading, effects.damage])
+        return np.array([*skeleton, *corner, effects.unloading, effects.damage, effects.yield_asymmetry])
     return np.array([stiffness, limit, effects.hardening])
 
 

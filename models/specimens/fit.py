@@ -95,6 +95,7 @@ PINCHED = SKELETON | {
     "pinch_displacement": SearchRange(0.0, 1.0, (0.5,), log=False),
     "unloading": SearchRange(0.0, 1.0, (0.2,), log=False),
     "damage": SearchRange(0.0, 1.0, (0.01,), log=False),
+    "asymmetry": SearchRange(-0.95, 0.95, (0.0,), log=False),
 }
 FREE: dict[str, dict[str, SearchRange]] = {
     "linear": {"stiffness": STIFFNESS},
@@ -124,7 +125,6 @@ FREE: dict[str, dict[str, SearchRange]] = {
         "yield_displacement": YIELDING,
         "hardening": HARDENING,
         "sharpness": SearchRange(1.0, 50.0, (5.0, 18.0)),
-        "loss": SearchRange(0.0, 0.98, (0.9,), log=False),
     },
     "trilinear": SKELETON,
     "pinched": PINCHED,

@@ -10,6 +10,8 @@
                                    the line from δ_0 to (δ_m, p·f_m)
                 In the last two there is no corner where δ_0 is beyond it.
     damage:     δ_m grows by the factor 1 + d·L/δ_y at every reversal; L is the path of δ_0 since the last one
+    asymmetry:  on the positive side all forces and deformations are those of the symmetric specimen times 1 + e, on
+                the negative side times 1 - e, so that both begin with the stiffness k
 
 δ_m is the largest deformation so far on the side to which the motion goes, initially that of the first bend, and f_m
 is the skeleton's force there. With p = 1, q = 1 and c = 1 reloading is that of Clough and Johnston. A partial
@@ -49,6 +51,7 @@ class PinchedParams(NamedTuple):
     pinch_displacement: float = 0.5  # q, place of the corner, from 0 to 1: see above
     unloading: float = 0.0  # a, exponent of the unloading stiffness; 0: it stays k
     damage: float = 0.0  # d, relative growth of δ_m per plastic deformation of δ_y
+    asymmetry: float = 0.0  # e, strength of the positive side less that of the negative one over their sum
 
 
 RULES = {
@@ -68,9 +71,12 @@ RULES = {
     ),
     "unloading": Rule("exponent of the unloading stiffness", least=0.0, most=1.0),
     "damage": Rule("growth of the peak per plastic deformation of yield_displacement", least=0.0, most=10.0),
+    "asymmetry": Rule(
+        "strength of the positive side less that of the negative one over their sum", least=-0.98, most=0.98
+    ),
 }
 STIFFNESS, YIELD_DISPLACEMENT, HARDENING, FIRST_BEND, SECOND_STIFFNESS = range(5)
-PINCH_FORCE, PINCH_DISPLACEMENT, UNLOADING, DAMAGE = range(5, 9)
+PINCH_FORCE, PINCH_DISPLACEMENT, UNLOADING, DAMAGE, ASYMMETRY = range(5, 10)
 
 # Places in the state. Of the last call: δ (m), f (N), and the direction of motion (±1, 0 before any motion). For upward
 # motion and, behind it, for downward motion: the peak to which it goes (m, as a magnitude), the deformation where the
@@ -145,12 +151,14 @@ def rise(
 def turn(p: Array, s: Array, side: int, way: float) -> None:
     """Begin a branch against the force of the last call: where the force will be zero, and the damage until then."""
     first = p[FIRST_BEND] * p[YIELD_DISPLACEMENT]
-    zero = way * s[DEFORMATION] - way * s[FORCE] / unloading_stiffness(p, max(s[PEAK + 1 - side], first))
+    size, other = 1.0 + way * p[ASYMMETRY], 1.0 - way * p[ASYMMETRY]
+    stiffness = unloading_stiffness(p, max(s[PEAK + 1 - side] / other, first))
+    zero = way * s[DEFORMATION] - way * s[FORCE] / stiffness
     s[ZERO + side] = zero
     travelled = abs(way * zero - s[LAST])
     s[LAST] = way * zero
     s[TRAVELLED + 1 - side] += travelled
-    if s[PEAK + side] > first:
+    if s[PEAK + side] > first * size:
         lost = s[TRAVELLED + side] + travelled
         s[PEAK + side] *= 1.0 + p[DAMAGE] * lost / p[YIELD_DISPLACEMENT]
     s[TRAVELLED + side] = 0.0
@@ -172,10 +180,12 @@ def step(p: Array, s: Array, deformation: float, corner: int) -> float:
         if way * s[FORCE] <= 0.0:
             turn(p, s, side, way)
     first = p[FIRST_BEND] * p[YIELD_DISPLACEMENT]
-    peak, other = max(s[PEAK + side], first), max(s[PEAK + 1 - side], first)
-    begun, ended = way * s[DEFORMATION], way * deformation
-    force = way * rise(p, way * s[FORCE], begun, ended, s[ZERO + side], peak, other, corner)
-    s[PEAK + side] = max(peak, ended)
+    size = 1.0 + way * p[ASYMMETRY]  # the rules hold for forces and deformations over the size of their side
+    peak = max(s[PEAK + side] / size, first)
+    other = max(s[PEAK + 1 - side] / (1.0 - way * p[ASYMMETRY]), first)
+    begun, ended = way * s[DEFORMATION] / size, way * deformation / size
+    force = rise(p, way * s[FORCE] / size, begun, ended, s[ZERO + side] / size, peak, other, corner)
+    s[PEAK + side] = size * max(peak, ended)
     s[DEFORMATION] = deformation
-    s[FORCE] = force
-    return force
+    s[FORCE] = way * size * force
+    return float(s[FORCE])

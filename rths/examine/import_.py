@@ -82,8 +82,8 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: Tex
         }
         say(json.dumps(report) + "\n")
         return
-    interval = mapping.plan.test.interval
-    say(f"{args.output}: {found.t.size} ticks of {interval:g} s; signals: {', '.join(present)}\n")
+    rows = "rows without times" if mapping.static else f"ticks of {mapping.plan.test.interval:g} s"
+    say(f"{args.output}: {found.t.size} {rows}; signals: {', '.join(present)}\n")
     say(f"absent: {', '.join(absent) or 'none'}\n")
     if form and form != TextForm():
         between = "tabs" if form.separator == "\t" else f"'{form.separator}'"
@@ -91,11 +91,11 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: Tex
             f"text: {between} between columns, decimal sign '{form.decimal}', {form.skip_rows} rows above the names\n"
         )
     if found.units:
-        rows = (f"{name} in {unit}" for name, unit in found.units.items())
-        say(f"units, from the row below the names: {', '.join(rows)}\n")
+        units = (f"{name} in {unit}" for name, unit in found.units.items())
+        say(f"units, from the row below the names: {', '.join(units)}\n")
     if found.interpolated:
         say(f"interpolated onto the ticks, and marked so: {', '.join(found.interpolated)}\n")
-    if mapping.plan.roles and not judged:
+    if mapping.plan.roles and not (judged or mapping.static):
         say(f"link: {UNJUDGED}\n")
 
 

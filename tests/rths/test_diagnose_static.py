@@ -36,7 +36,9 @@ def test_a_report_on_static_data_holds_no_times_and_no_effects_on_rates(
     (tmp_path / "plan.toml").write_text('[test]\ninterval = 0.01\n[compensator]\nkind = "none"\n')
     recording, out, html = (tmp_path / name for name in ("a.mcap", "a.json", "a.html"))
     assert call("import", tmp_path / "a.csv", "--map", tmp_path / "map.toml", "-o", recording) == 0
-    capsys.readouterr()
+    imported = capsys.readouterr().out
+    assert "680 rows without times" in imported
+    assert not TIME.findall(imported)
     assert call("diagnose", recording, "--json", out, "--html", html) == 0
     text = capsys.readouterr().out
     assert "column friction" in text

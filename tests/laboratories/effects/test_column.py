@@ -274,11 +274,15 @@ def test_the_further_laws_of_yielding_equal_the_specimen_models_of_that_name(nam
     path = through(2e-3, -3e-3, 2.5e-3, -1e-3)
     shapes = {"hardening": 0.03, "first_bend": 0.4, "second_stiffness": 0.6}
     corner = {"pinch_force": 0.3, "pinch_displacement": 0.6, "unloading": 0.2, "damage": 0.05}
+    side = {"asymmetry": -0.3} if name != "trilinear" else {}
     given = shapes | (corner if name != "trilinear" else {})
     law = float(specimen.LAWS.index(name))
     more: dict[str, Any] = {"yield_displacement": 1e-3, "law": law, **given}
+    more |= {f"yield_{key}": value for key, value in side.items()}
     got = specimen_under(path, ColumnEffects(**more))
-    expected = forces(name, {"stiffness": K, "yield_displacement": 1e-3, **given}, path.astype(np.float64))
+    expected = forces(
+        name, {"stiffness": K, "yield_displacement": 1e-3, **given, **side}, path.astype(np.float64)
+    )
     assert np.allclose(got, expected, rtol=1e-9, atol=1e-6)
 
 

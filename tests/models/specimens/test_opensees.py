@@ -80,13 +80,25 @@ def test_bouc_wen_equals_that_of_opensees(ops: Any, n: float, beta: float, gamma
     np.testing.assert_allclose(found, expected, rtol=0, atol=3e-3 * K * DY)
 
 
-@pytest.mark.parametrize(("force", "place", "unloading"), [(1.0, 1.0, 0.0), (0.3, 0.6, 0.0), (0.5, 0.4, 0.3)])
-def test_pinched_equals_hysteretic(ops: Any, force: float, place: float, unloading: float) -> None:
+@pytest.mark.parametrize(
+    ("force", "place", "unloading", "asymmetry"),
+    [
+        (1.0, 1.0, 0.0, 0.0),
+        (0.3, 0.6, 0.0, 0.0),
+        (0.5, 0.4, 0.3, 0.0),
+        (0.3, 0.6, 0.0, -0.4),
+        (1.0, 1.0, 0.3, 0.6),
+    ],
+)
+def test_pinched_equals_hysteretic(
+    ops: Any, force: float, place: float, unloading: float, asymmetry: float
+) -> None:
     # theirs ends in a third point, beyond which its last line goes on
     points, first, last = path(2000), 0.5, 40.0
     bend, yields = first * K * DY, (first + 0.5 * 0.4) * K * DY
     corners = [bend, first * DY, yields, DY, yields + 0.05 * K * (last - 1.0) * DY, last * DY]
-    skeleton = [*corners, *(-corner for corner in corners)]
+    sides = 1.0 + asymmetry, asymmetry - 1.0
+    skeleton = [side * corner for side in sides for corner in corners]
     expected = theirs(ops, points, "Hysteretic", *skeleton, place, force, 0.0, 0.0, unloading)
     found = ours(
         "pinched",
@@ -97,6 +109,7 @@ def test_pinched_equals_hysteretic(ops: Any, force: float, place: float, unloadi
         pinch_force=force,
         pinch_displacement=place,
         unloading=unloading,
+        asymmetry=asymmetry,
     )
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-3 * K * DY)
 

@@ -306,3 +306,19 @@ def test_a_branch_of_menegotto_and_pinto_begins_at_a_reversal_of_the_least_size(
     path = DY * np.concatenate([np.linspace(0.0, 3.0, 50), np.linspace(2.9, -3.0, 60)])
     exact, coarse = (forces("menegotto_pinto", path, least_turn=least) for least in (0.0, 0.05))
     assert np.array_equal(exact, coarse)
+
+
+@pytest.mark.parametrize("name", ["pinched", "pinched_by_peak", "pinched_by_rest"])
+def test_a_pinched_specimen_is_stronger_on_one_side_by_its_asymmetry(name: str) -> None:
+    size, far = 0.3, 10.0 * DY
+    up = forces(name, np.linspace(0.0, far, 200), asymmetry=size)
+    down = forces(name, np.linspace(0.0, -far, 200), asymmetry=size)
+    for force, side in ((up[-1], 1.0 + size), (-down[-1], 1.0 - size)):
+        bent = 0.5 * DY + 0.4 * 0.5 * DY  # of the skeleton where its third line begins, times k
+        assert force == pytest.approx(K * (side * bent + 0.05 * (far - side * DY)))
+    path = DY * np.concatenate(
+        [4.0 * np.sin(np.linspace(0.0, 7.0, 300)), 2.0 * np.sin(np.linspace(7.0, 30.0, 900))]
+    )
+    np.testing.assert_allclose(
+        forces(name, path, asymmetry=size), -forces(name, -path, asymmetry=-size), rtol=1e-12
+    )

@@ -42,12 +42,14 @@ def mirrored(points: list[float]) -> list[float]:
 
 
 def peak_oriented(name: str, v: Values, *more: float) -> Rows:
-    """Ibarra, Medina and Krawinkler's hinge, whose cap lies beyond every drift of the trial."""
-    k, force = v["k"], v["k"] * v["d"]
-    # m to the cap, m beyond it, residual share, m to failure; each in both directions
-    plastic = [0.04, 0.04, 0.1, 0.1, 0.2, 0.2, 0.3, 0.3]
-    lasting = [v["life"]] * 4 + [1.0] * 4
-    return [[name, 1, k, v["b"], v["b"], force, -force, *more, *lasting, *plastic, 1.0, 1.0]]
+    """Ibarra, Medina and Krawinkler's hinge, whose cap lies beyond every drift of the trial.
+
+    OpenSees warns of its older ModIMKPinching: after a reversal just beyond yielding that one's force is zero for ever.
+    """
+    k, force, cap = v["k"], v["k"] * v["d"], 0.04
+    # m of plastic deformation to the cap and beyond it, m to failure; forces: yielding, and over it the cap and the rest
+    side = [cap, 0.1, 0.3, force, 1.0 + v["b"] * k * cap / force, 0.2]
+    return [[name, 1, k, *side, *side, *[v["life"]] * 4, *[1.0] * 6, *more]]
 
 
 MATERIALS: dict[str, Material] = {
@@ -86,10 +88,10 @@ MATERIALS: dict[str, Material] = {
         YIELDING,
     ),
     "IMKPeakOriented": Material(
-        lambda v: peak_oriented("ModIMKPeakOriented", v), {"b": (0.01, 0.1), "life": (0.3, 3.0)}, WORN
+        lambda v: peak_oriented("IMKPeakOriented", v), {"b": (0.01, 0.1), "life": (0.3, 3.0)}, WORN
     ),
     "IMKPinching": Material(
-        lambda v: peak_oriented("ModIMKPinching", v, v["pinch"], v["pinch"], 0.5),
+        lambda v: peak_oriented("IMKPinching", v, v["pinch"], 0.5),
         {"b": (0.01, 0.1), "pinch": (0.2, 0.6), "life": (0.3, 3.0)},
         PINCHED,
     ),

@@ -16,6 +16,8 @@ with yield displacement δ_y, hardening α and exponent n. The parameter `law` c
     9   pinched, with the corner of reloading at a share of the deformation that is left where the peak is unloaded
     10  the same with a trilinear skeleton
 
+Laws 5 to 10 may be stronger on one side, by `asymmetry`: concrete that cracks, or bars on one side only.
+
 Not to be confused with `column.degradation`, which softens without a loop, `column.friction`, whose loop has the same
 height at every amplitude, or `column.self_centring`, whose loop closes before the origin.
 """
@@ -31,7 +33,7 @@ SKELETON = {"first_bend": 0.5, "second_stiffness": 0.5}
 # Of the yield displacement. Between two ticks the noise of a command turns the motion by this much, in the laboratory
 # at other times than in the replay; Menegotto and Pinto's law forgets a branch at every turn, a specimen does not.
 TURN = 3e-4
-RELOADING = {"pinch_force": 0.5, "pinch_displacement": 0.5, "unloading": 0.2, "damage": 0.01}
+RELOADING = {"pinch_force": 0.5, "pinch_displacement": 0.5, "unloading": 0.2, "damage": 0.01, "asymmetry": 0.0}
 
 
 def share(name: str, null: float, least: float, says: str) -> Parameter:
@@ -131,6 +133,16 @@ EFFECT = sets(
             most=10.0,
             sizes=(),
             says="relative growth of the peak of laws 5 to 10 per plastic deformation of yield_displacement",
+            shape=True,
+        ),
+        "yield_asymmetry": Parameter(
+            "asymmetry",
+            "",
+            null=0.0,
+            least=-0.98,
+            most=0.98,
+            sizes=(),
+            says="strength of laws 5 to 10 on the positive side less that on the negative one, over their sum",
             shape=True,
         ),
     },
