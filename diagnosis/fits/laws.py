@@ -257,15 +257,16 @@ def as_specimen(
     }
 
 
-def coupled(fit: Fit, best: Fit) -> list[Fit]:
-    """Fits with the effects that one model of a specimen holds together.
+def coupled(fit: Fit, first: list[Fit]) -> list[Fit]:
+    """Fits with the effects that one model of a specimen holds, beside those with one effect, `first`, best first.
 
     They are a slider behind play, and a law of yielding whose first stiffness is not the planned one. One by one such
-    effects explain little, so that a search does not reach them: without its play a slider reverses too early. They are
-    tried where much of the force is left and more than noise, and where the model follows the measured force about as
-    well as the best fit known, or better.
+    effects explain little, so that a search does not reach them: without its play a slider reverses too early. Nor
+    does it reach yielding where its first law is far from the specimen's. They are tried where much of the force is
+    left and more than noise, and where the model follows the measured force about as well as the best fit known, or
+    better.
     """
-    way = path(fit.data.part)
+    way, best = path(fit.data.part), first[0]
     if way is None or not leaves(best):
         return []
     residual = best.data.residual(hypothesis.lay(best.data, best.z, best.values))[:, -1]  # of the force
@@ -284,7 +285,9 @@ def coupled(fit: Fit, best: Fit) -> list[Fit]:
         (found[effect.laws[place].model].nrmse, beside(fit, effect, place, found[effect.laws[place].model]))
         for effect, place in places
     ]
-    known = sorted((item for item in starts if item[1] and item[0] < NEARLY * left), key=lambda item: item[0])
+    tried = {item.names for item in first}
+    starts = [item for item in starts if item[0] < NEARLY * left and tuple(item[1]) not in tried]
+    known = sorted(starts, key=lambda item: item[0])
     begun = [fitting.at(fit.data, fit.values | values, np.zeros(fit.z.size)) for _, values in known[:FITTED]]
     leading = sorted(begun, key=cost)[:TOGETHER]
     done = (settled(fitted(item, LONG, ROUNDS)) for item in leading)
@@ -307,7 +310,7 @@ def works(fit: Fit, force: float) -> bool:
 
 
 def beside(fit: Fit, effect: Effect, place: int, found: SpecimenFit) -> Values:
-    """An effect under a law and what its model holds beside it, from that model's parameters; empty for nothing."""
+    """An effect under a law and what its model holds beside it, from that model's parameters."""
     catalogue, law = fit.data.catalogue, effect.laws[place]
     (strength,) = (item for item in effect.parameters if not item.shape)
     base = effect.under(place, effect.values({strength.name: 0.0}))
@@ -324,7 +327,7 @@ def beside(fit: Fit, effect: Effect, place: int, found: SpecimenFit) -> Values:
         return result
     factor = found.parameters["stiffness"] / fit.data.system.plan.column.stiffness
     if STIFFNESS not in catalogue or 1.0 / OTHERWISE < factor < OTHERWISE:
-        return {}
+        return result
     (parameter,) = catalogue[STIFFNESS].parameters
     return {STIFFNESS: {parameter.name: within(parameter, factor)}} | result
 

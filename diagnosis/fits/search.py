@@ -48,7 +48,7 @@ def search(data: Data, scales: Scales) -> Search:
         bare, instead = settling.instead_of_colour(bare, scales)
         first = instead or first
     if first:
-        first = sorted([*laws.coupled(bare, first[0]), *first], key=lambda fit: fit.cost)
+        first = sorted([*laws.coupled(bare, first), *first], key=lambda fit: fit.cost)
     bare, chosen, first, beside = selected(bare, first, scales)
     if not chosen.names:
         return Search(bare.data, bare, chosen, ())

@@ -70,6 +70,7 @@ class Driven(ColumnAlone):
         "pinch_displacement": 0.5,
         "unloading": 0.3,
         "damage": 0.02,
+        "asymmetry": 0.2,
     }
 
     def __init__(self) -> None:

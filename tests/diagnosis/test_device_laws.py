@@ -42,7 +42,7 @@ def test_a_friction_damper_with_play_is_friction_and_slip_whatever_stiffness_is_
     part = FrictionDamper()
     data = data_of(part)
     bare = fitting.fit(data, {})
-    found, *_ = laws.coupled(bare, bare)
+    found, *_ = laws.coupled(bare, [bare])
     friction, slip = found.values["column.friction"], found.values["column.slip"]
     assert friction["force"] == pytest.approx(0.5 * (part.PUSH + part.PULL), rel=0.02)
     assert friction["asymmetry"] == pytest.approx(-0.2, abs=0.01)
@@ -57,7 +57,7 @@ def test_no_effects_of_one_model_are_tried_beside_a_fit_that_leaves_only_noise(
     bare = fitting.fit(data, {})
     quiet = replace(bare, reduced=np.random.default_rng(1).standard_normal(bare.reduced.shape))
     monkeypatch.setattr(laws, "following", None)
-    assert laws.coupled(bare, quiet) == []
+    assert laws.coupled(bare, [quiet]) == []
 
 
 class FluidDamper(FrictionDamper):
@@ -120,6 +120,18 @@ def test_a_relaxing_part_is_one_effect_also_where_two_are_found_that_do_the_same
     assert values["coefficient"] == pytest.approx(part.BRANCH * part.TIME, rel=0.05)
 
 
+def test_a_specimen_that_no_first_law_is_like_is_found_by_its_force_over_deformation() -> None:
+    data = data_of(Driven())
+    bare = fitting.fit(data, {})
+    found, *_ = laws.coupled(bare, [bare])
+    assert found.names == ("column.yielding",)
+    assert found.values["column.yielding"]["asymmetry"] == pytest.approx(Driven.TRUE["asymmetry"], abs=0.01)
+    tried = fitting.fit(
+        data, {"column.yielding": CATALOGUE["column.yielding"].values({"yield_displacement": LIMIT})}
+    )
+    assert all(item.names != found.names for item in laws.coupled(bare, [tried]))
+
+
 class SoftlyPlanned(Driven):
     """The column that yields by the pinched law, planned four times as soft as it is."""
 
@@ -131,7 +143,7 @@ class SoftlyPlanned(Driven):
 def test_a_column_that_yields_is_found_where_the_planned_stiffness_means_nothing() -> None:
     data = data_of(SoftlyPlanned(), System(Plan()).scaled("column", "stiffness", 0.25))
     bare = fitting.fit(data, {})
-    found, *_ = laws.coupled(bare, bare)
+    found, *_ = laws.coupled(bare, [bare])
     assert set(found.values) == {"column.stiffness", "column.yielding"}
     assert found.values["column.stiffness"]["factor"] == pytest.approx(4.0, rel=0.03)
     assert found.values["column.yielding"]["yield_displacement"] == pytest.approx(LIMIT, rel=0.05)

@@ -33,7 +33,13 @@ SKELETON = {"first_bend": 0.5, "second_stiffness": 0.5}
 # Of the yield displacement. Between two ticks the noise of a command turns the motion by this much, in the laboratory
 # at other times than in the replay; Menegotto and Pinto's law forgets a branch at every turn, a specimen does not.
 TURN = 3e-4
-RELOADING = {"pinch_force": 0.5, "pinch_displacement": 0.5, "unloading": 0.2, "damage": 0.01, "asymmetry": 0.0}
+RELOADING = {
+    "pinch_force": 0.5,
+    "pinch_displacement": 0.5,
+    "unloading": 0.2,
+    "damage": 0.01,
+    "asymmetry": 0.0,
+}
 
 
 def share(name: str, null: float, least: float, says: str) -> Parameter:
