@@ -47,7 +47,7 @@ def peak_oriented(name: str, v: Values, *more: float) -> Rows:
     OpenSees warns of its older ModIMKPinching: after a reversal just beyond yielding that one's force is zero for ever.
     """
     k, force, cap = v["k"], v["k"] * v["d"], 0.04
-    # m of plastic deformation to the cap and beyond it, m to failure; forces: yielding, and over it the cap and the rest
+    # m of plastic deformation to the cap and beyond it, m to failure; N at yielding; over it the cap and the rest
     side = [cap, 0.1, 0.3, force, 1.0 + v["b"] * k * cap / force, 0.2]
     return [[name, 1, k, *side, *side, *[v["life"]] * 4, *[1.0] * 6, *more]]
 
