@@ -55,6 +55,7 @@ class Data:
     lines: Array | None = None  # (ticks, signals) what the sensors pick up
     spikes: Mask | None = None  # (ticks, signals) single samples that do not count
     related: Crosswise | None = None  # what may follow from the part's inputs
+    heard: Array | None = None  # (signals,) coloured noise that other signals' gaps made doubtful, 0 for none
 
     @property
     def groups(self) -> int:

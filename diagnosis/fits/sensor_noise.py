@@ -168,14 +168,18 @@ def whitened(fit: Fit) -> Data:
 
 
 def share(data: Data) -> float:
-    """Largest rms of a coloured noise over that of its reading, of noise that only the residual tells of.
+    """Largest of `shares`."""
+    return float(np.max(shares(data), initial=0.0))
+
+
+def shares(data: Data) -> Array:
+    """Rms (signals,) of a coloured noise that only the residual tells of over that of its reading; zero for others.
 
     Noise that is steady while the motion is not does not count: what an effect leaves follows the motion.
     """
     level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
-    own = [item.unproven for item in data.noise]
-    ratios = data.white[own] / np.maximum(level[own], 1e-300)
-    return float(np.max(ratios, initial=0.0))
+    own = np.array([item.unproven for item in data.noise] or np.zeros(level.size), dtype=bool)
+    return np.where(own, data.white / np.maximum(level, 1e-300), 0.0)
 
 
 def loudest(fit: Fit) -> Array:

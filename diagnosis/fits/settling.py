@@ -16,7 +16,9 @@ from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import screen
 from diagnosis.fits.sensor_noise import quieter
-from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, leaves, model_error
+from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, gaps, leaves, model_error
+from diagnosis.signals.mask import Mask
+from models.registry import Array
 
 ROUNDS = 4  # in which a fit and the noise that it leaves are found in turn
 STEPS = 6  # of a fit between two of these
@@ -56,7 +58,7 @@ def settled(fit: Fit, accepted: Data | None = None) -> Fit:
         if not hidden(found, accepted):
             return replace(found, data=data) if found.data is not data else found
         data = sensor_noise.remodelled(fit)
-        data = replace(data, noise=(), lines=None, spikes=None)
+        data = replace(data, noise=(), lines=None, spikes=None, heard=heard(found))
     return under_white(found, data, fit.data)
 
 
@@ -76,7 +78,9 @@ def shifted(after: Data, before: Data) -> bool:
 def under_white(fit: Fit, data: Data, before: Data) -> Fit:
     """The fit under white noise: that of `before` where it is no lower."""
     changed = bool(before.noise) or data.lines is not None or data.spikes is not None
-    data = data if changed or quieter(data, before) else replace(before, related=data.related)
+    data = (
+        data if changed or quieter(data, before) else replace(before, related=data.related, heard=data.heard)
+    )
     found = fitting.at(data, fit.values, fit.z)
     return fitting.polished(found) if found.names and leaves(found) else found
 
@@ -95,22 +99,46 @@ def hidden(fit: Fit, accepted: Data | None = None) -> bool:
     noise, and it is far louder at some frequency than at the highest ones, as the noise of no sensor is; or it comes
     and goes, or what effects leave would be a large share of a reading and is louder than the noise `accepted`.
     """
-    if fit.names and sensor_noise.share(fit.data) > SMALL and not no_louder(fit.data, accepted):
+    if fit.names and louder(fit.data, accepted):
         return True
-    allowed = model_error(fit)
-    least = np.maximum(MATERIAL, allowed)
-    seen = any(
-        item.ratio > limit and item.significance > SIGNIFICANT
-        for item, limit in zip(sensor_noise.foreseen(fit), least, strict=True)
-    )
-    loud = sensor_noise.loudest(fit) > LOUDEST
-    uneven = np.array([item.tails > UNEVEN for item in fit.data.noise])
-    return seen or bool(np.any(loud & uneven)) or (is_loud(fit) and leaves(fit, allowed))
+    return bool(np.any(doubtful(fit))) or (is_loud(fit) and leaves(fit, model_error(fit)))
 
 
 def is_loud(fit: Fit) -> bool:
     """Whether the noise that a fit is measured by is far louder at some frequency than that of a sensor."""
     return bool(np.any(sensor_noise.loudest(fit) > LOUDEST))
+
+
+def doubtful(fit: Fit) -> Mask:
+    """The signals (signals,) whose coloured noise the inputs foresee, or which is loud and comes and goes."""
+    least = np.maximum(MATERIAL, model_error(fit))
+    seen = [
+        item.ratio > limit and item.significance > SIGNIFICANT
+        for item, limit in zip(sensor_noise.foreseen(fit), least, strict=True)
+    ]
+    uneven = [item.tails > UNEVEN for item in fit.data.noise]
+    return np.array(seen) | (np.array(uneven) & (sensor_noise.loudest(fit) > LOUDEST))
+
+
+def heard(fit: Fit) -> Array:
+    """Rms (signals,) of the coloured noise of signals that show no gap, beside others that may; 0 for none."""
+    leaving = [
+        item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in gaps(fit, fit.data.group)
+    ]
+    coloured = np.array([item.density is not None for item in fit.data.noise])
+    return np.where(coloured & ~doubtful(fit) & ~np.array(leaving), fit.data.white, 0.0)
+
+
+def louder(data: Data, accepted: Data | None) -> bool:
+    """Whether a signal has noise that effects may have left: a large share of its reading, and more than `accepted`.
+
+    A signal whose noise showed no gap without effects may have as much beside them, even where others showed one.
+    """
+    if no_louder(data, accepted):
+        return False
+    known = None if accepted is None or sensor_noise.coloured(accepted) else accepted.heard
+    more = np.zeros(data.white.size) if known is None else known
+    return bool(np.any((sensor_noise.shares(data) > SMALL) & (more < sensor_noise.LOWER * data.white)))
 
 
 def no_louder(data: Data, accepted: Data | None) -> bool:
@@ -134,7 +162,7 @@ def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
         fits = candidates.best_laws(fitting.at(sensor_noise.whitened(bare), {}, bare.z), scales)
     if not fits or not far_likelier(remodelled(fits[0]), bare):
         return bare, []
-    best, bare = settled(fits[0]), as_near(bare, fits[0])
+    best, bare = settled(fits[0], bare.data), as_near(bare, fits[0])
     if not far_likelier(best, bare):
         return bare, []
     return again(bare, best.data), [best, *(again(item, best.data) for item in fits[1:])]

@@ -13,7 +13,7 @@ from common.recording.imported import IMPORT
 from diagnosis.diagnose import examine
 from diagnosis.findings import logger, report
 from diagnosis.findings.found import Diagnosis
-from diagnosis.fits import residuals, sensor_noise, settling
+from diagnosis.fits import fitting, residuals, sensor_noise, settling
 from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.record import Record
@@ -116,6 +116,20 @@ def test_noise_beside_an_effect_is_no_louder_than_the_noise_accepted(cases: Case
     assert not settling.no_louder(replace(data, white=1.5 * data.white), data)
     assert not settling.no_louder(data, replace(data, noise=()))
     assert not settling.no_louder(data, None)
+
+
+def test_a_reading_without_a_gap_may_be_as_loud_beside_an_effect_on_another_one(cases: Cases) -> None:
+    whole = imported(cases.record({"sensor.column_displacement.gain": {"factor": 0.8}}), noisy)
+    data = residuals.prepare(lab_a(whole), whole)
+    bare = settling.settled(fitting.fit(data, {})).data
+    assert bare.heard is not None
+    assert bare.heard[0] == 0.0
+    assert bare.heard[1] > 0.0
+    beside = sensor_noise.modelled(data, System(whole.plan))
+    beside = replace(beside, noise=tuple(replace(item, steady=False) for item in beside.noise))
+    assert settling.louder(beside, None)
+    assert settling.louder(beside, replace(bare, heard=0.5 * beside.white))
+    assert not settling.louder(beside, replace(bare, heard=beside.white))
 
 
 def test_loud_noise_that_may_follow_the_motion_is_too_few_data_where_inputs_cannot_be_asked(
