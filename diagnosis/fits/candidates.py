@@ -10,9 +10,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from diagnosis.fits import contact, fitting, laws
+from diagnosis.fits import contact, fitting
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.laws.best import in_best_laws
+from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import WORKERS, ScreenedEffect, screen
 from diagnosis.fits.unexplained import MATERIAL, remaining
@@ -85,7 +87,7 @@ def promised(near: Fit, scales: Scales) -> list[ScreenedEffect]:
         return found
     under_first = {item.effect.name: item.gain for item in reversed(found)}
     better: dict[str, ScreenedEffect] = {}
-    for item in laws.unlike_first(near, scales):
+    for item in unlike_first(near, scales):
         name = item.effect.name
         if item.gain > max(most, FAR_MORE * under_first.get(name, 0.0)):
             better.setdefault(name, item)
@@ -107,7 +109,7 @@ def with_stop(fit: Fit, fits: list[Fit]) -> list[Fit]:
 
 def best_laws(fit: Fit, scales: Scales) -> list[Fit]:
     """Fits with one effect more, best first, each effect under the law of its mechanism that leaves least."""
-    return laws.in_best_laws(with_stop(fit, extended(fit, scales)))
+    return in_best_laws(with_stop(fit, extended(fit, scales)))
 
 
 def without(fit: Fit, name: str) -> Fit:

@@ -13,9 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.fits import fitting, laws
+from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.laws.best import cost, simplest
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.screening import WORKERS
 from laboratories.effects.effect import Effect
@@ -55,13 +56,13 @@ def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
     with ThreadPoolExecutor(WORKERS) as pool:
         near = list(pool.map(lambda start: beginning(data, fit, effect, start, groups), starts))
         each = len(stop.starts)
-        kept = (min(near[place : place + each], key=laws.cost) for place in range(0, len(near), each))
+        kept = (min(near[place : place + each], key=cost) for place in range(0, len(near), each))
         best = [item.values[effect.name] for item in kept]
         further = [under for values in best for under in further_laws(effect, values)]
         begun = [*starts, *further]
         fits = list(pool.map(lambda start: grown(data, fit, effect, start, groups), begun))
     springs, others = by_law(fits, effect.name)
-    return laws.simplest(min(springs, key=laws.cost), others)
+    return simplest(min(springs, key=cost), others)
 
 
 def by_law(fits: Sequence[Fit], name: str) -> tuple[list[Fit], list[Fit]]:

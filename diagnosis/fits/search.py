@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from diagnosis.fits import candidates, fitting, hypothesis, laws, settling, trade, worth
+from diagnosis.fits import candidates, fitting, hypothesis, settling, trade, worth
 from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.laws.coupled import coupled
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
@@ -48,7 +49,7 @@ def search(data: Data, scales: Scales) -> Search:
         bare, instead = settling.instead_of_colour(bare, scales)
         first = instead or first
     if first:
-        first = sorted([*laws.coupled(bare, first), *first], key=lambda fit: fit.cost)
+        first = sorted([*coupled(bare, first), *first], key=lambda fit: fit.cost)
     bare, chosen, first, beside = selected(bare, first, scales)
     if not chosen.names:
         return Search(bare.data, bare, chosen, ())

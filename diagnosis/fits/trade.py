@@ -12,10 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnosis.fits import candidates, fitting, laws, worth
+from diagnosis.fits import candidates, fitting, worth
 from diagnosis.fits.candidates import TIED
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Problem, left_out
+from diagnosis.fits.laws.best import raced, settled
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.unexplained import leaves
 
@@ -106,9 +107,9 @@ def under_others(fit: Fit) -> list[Fit]:
         if len(fit.data.catalogue[name].laws) > 1:
             rest = {key: values for key, values in fit.values.items() if key not in (gone, name)}
             less = fitting.fit(fit.data, rest | {name: fit.values[name]}, fit.z)
-            result += laws.raced([less], NEARING * excess(less)).values()
+            result += raced([less], NEARING * excess(less)).values()
     near = [item for item in result if excess(item) < CLOSE * max(excess(fit), TIED)]
-    return [laws.settled(item) for item in near]
+    return [settled(item) for item in near]
 
 
 def parted(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:

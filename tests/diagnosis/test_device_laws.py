@@ -9,7 +9,9 @@ import pytest
 
 from common.plan.plan import Plan
 from common.roles import MASTER
-from diagnosis.fits import fitting, laws
+from diagnosis.fits import fitting
+from diagnosis.fits.laws.best import in_best_laws
+from diagnosis.fits.laws.coupled import coupled
 from diagnosis.fits.trade import simplest, under_others
 from diagnosis.recorded.parts import ColumnAlone
 from laboratories.effects import CATALOGUE
@@ -42,7 +44,7 @@ def test_a_friction_damper_with_play_is_friction_and_slip_whatever_stiffness_is_
     part = FrictionDamper()
     data = data_of(part)
     bare = fitting.fit(data, {})
-    found, *_ = laws.coupled(bare, [bare])
+    found, *_ = coupled(bare, [bare])
     friction, slip = found.values["column.friction"], found.values["column.slip"]
     assert friction["force"] == pytest.approx(0.5 * (part.PUSH + part.PULL), rel=0.02)
     assert friction["asymmetry"] == pytest.approx(-0.2, abs=0.01)
@@ -56,8 +58,8 @@ def test_no_effects_of_one_model_are_tried_beside_a_fit_that_leaves_only_noise(
     data = data_of(FrictionDamper())
     bare = fitting.fit(data, {})
     quiet = replace(bare, reduced=np.random.default_rng(1).standard_normal(bare.reduced.shape))
-    monkeypatch.setattr(laws, "following", None)
-    assert laws.coupled(bare, [quiet]) == []
+    monkeypatch.setattr("diagnosis.fits.laws.coupled.following", None)
+    assert coupled(bare, [quiet]) == []
 
 
 class FluidDamper(FrictionDamper):
@@ -81,7 +83,7 @@ def test_a_fluid_damper_is_viscous_with_its_exponent_whatever_stiffness_is_plann
     part = FluidDamper()
     data = data_of(part)
     first = fitting.fit(data, {"column.viscous": {"coefficient": 200e3}})
-    (found,) = laws.in_best_laws([first])
+    (found,) = in_best_laws([first])
     values = found.values["column.viscous"]
     assert values["law"] == 2
     assert values["exponent"] == pytest.approx(part.EXPONENT, rel=0.03)
@@ -123,13 +125,13 @@ def test_a_relaxing_part_is_one_effect_also_where_two_are_found_that_do_the_same
 def test_a_specimen_that_no_first_law_is_like_is_found_by_its_force_over_deformation() -> None:
     data = data_of(Driven())
     bare = fitting.fit(data, {})
-    found, *_ = laws.coupled(bare, [bare])
+    found, *_ = coupled(bare, [bare])
     assert found.names == ("column.yielding",)
     assert found.values["column.yielding"]["asymmetry"] == pytest.approx(Driven.TRUE["asymmetry"], abs=0.01)
     tried = fitting.fit(
         data, {"column.yielding": CATALOGUE["column.yielding"].values({"yield_displacement": LIMIT})}
     )
-    assert all(item.names != found.names for item in laws.coupled(bare, [tried]))
+    assert all(item.names != found.names for item in coupled(bare, [tried]))
 
 
 class SoftlyPlanned(Driven):
@@ -143,7 +145,7 @@ class SoftlyPlanned(Driven):
 def test_a_column_that_yields_is_found_where_the_planned_stiffness_means_nothing() -> None:
     data = data_of(SoftlyPlanned(), System(Plan()).scaled("column", "stiffness", 0.25))
     bare = fitting.fit(data, {})
-    found, *_ = laws.coupled(bare, [bare])
+    found, *_ = coupled(bare, [bare])
     assert set(found.values) == {"column.stiffness", "column.yielding"}
     assert found.values["column.stiffness"]["factor"] == pytest.approx(4.0, rel=0.03)
     assert found.values["column.yielding"]["yield_displacement"] == pytest.approx(LIMIT, rel=0.05)

@@ -6,9 +6,11 @@ import numpy as np
 
 from common.plan.plan import Plan
 from common.roles import MASTER
-from diagnosis.fits import fitting, hypothesis, laws, residuals
+from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.laws.best import in_best_laws
+from diagnosis.fits.laws.specimen import path
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.trade import alone, simplest
 from diagnosis.recorded.joined import JoinedPart
@@ -40,7 +42,7 @@ def first_law(part: Part | None = None) -> Fit:
 
 
 def test_a_pinched_law_with_damage_is_found_from_force_over_deformation() -> None:
-    (found,) = laws.in_best_laws([first_law(Driven())])
+    (found,) = in_best_laws([first_law(Driven())])
     values = found.values["column.yielding"]
     effect = CATALOGUE["column.yielding"]
     assert effect.laws[int(values["law"])].name == "pinched trilinear"
@@ -53,15 +55,15 @@ def test_a_pinched_law_with_damage_is_found_from_force_over_deformation() -> Non
 def test_the_recording_with_the_largest_deformation_starts_the_fit_of_a_law() -> None:
     near, far = Driven(), Driven()
     near.inputs = 0.5 * near.inputs
-    found = laws.path(JoinedPart([near, far]))
+    found = path(JoinedPart([near, far]))
     assert found is not None
     np.testing.assert_array_equal(found[0], far.inputs)
-    assert laws.path(MadeSpecimen()) is None
+    assert path(MadeSpecimen()) is None
 
 
 def test_the_right_law_is_selected_with_the_columns_parameters() -> None:
     before = first_law()
-    (found,) = laws.in_best_laws([before])
+    (found,) = in_best_laws([before])
     values = found.values["column.yielding"]
     effect = CATALOGUE["column.yielding"]
     assert found.names == before.names
@@ -115,7 +117,7 @@ def cracked(values: Values) -> Fit:
 
 def test_cracks_that_close_by_an_unknown_bell_are_pinching_with_tails() -> None:
     first = {"factor": 0.3, "width": 0.001, "hardening": 0.1}
-    (found,) = laws.in_best_laws([cracked({"column.pinching": first})])
+    (found,) = in_best_laws([cracked({"column.pinching": first})])
     values = found.values["column.pinching"]
     assert CATALOGUE["column.pinching"].laws[int(values["law"])].name == "with tails"
     np.testing.assert_allclose(values["factor"], 0.3, atol=0.06)
@@ -173,7 +175,7 @@ def test_friction_with_presliding_is_found_with_its_distance() -> None:
     group, train = residuals.withheld(part.TICKS, INTERVAL)
     data = Data(part, System(Plan()), part.level, part.level, group, train, np.zeros(2))
     before = fitting.fit(data, {"damper.friction": {"force": 2.0, "velocity": 1e-6}})
-    (found,) = laws.in_best_laws([before])
+    (found,) = in_best_laws([before])
     values = found.values["damper.friction"]
     assert CATALOGUE["damper.friction"].laws[int(values["law"])].name == "with presliding"
     np.testing.assert_allclose(values["force"], part.FORCE, rtol=0.01)
@@ -228,7 +230,7 @@ def test_play_behind_the_tables_loop_is_told_from_play_before_it() -> None:
     group, train = residuals.withheld(part.TICKS, INTERVAL)
     data = Data(part, System(Plan()), part.level, part.level, group, train, np.zeros(1))
     before = fitting.fit(data, {"table.backlash": {"width": 4e-4}})
-    (found,) = laws.in_best_laws([before])
+    (found,) = in_best_laws([before])
     values = found.values["table.backlash"]
     assert CATALOGUE["table.backlash"].laws[int(values["law"])].name == "behind the loop"
     np.testing.assert_allclose(values["width"], part.WIDTH, rtol=0.05)

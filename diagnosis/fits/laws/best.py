@@ -1,0 +1,150 @@
+"""A mechanism that has several laws: the one that fits best stands for it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from scipy.optimize import minimize
+
+from diagnosis.fits import fitting
+from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.hypothesis import Problem
+from diagnosis.fits.laws.specimen import following, path
+from diagnosis.fits.laws.starts import starts
+from diagnosis.fits.screening import WORKERS
+from diagnosis.fits.unexplained import remaining
+from laboratories.effects.effect import Effect
+from models.registry import Array
+
+FITTED = 4  # of an effect's laws, those with the best starts
+ROUGH = 3  # steps of a first fit, after which laws are held against each other
+LEADING = 4  # of all laws, those that are fitted to their end
+STEPS, ROUNDS = 8, 2  # of such a fit
+TURNS, EVALUATIONS = 2, 60  # of the simplex with the effects' parameters, each followed by a fit of all
+LOGARITHMIC, LINEAR = 0.06, 0.4  # first edges of the simplex, of the logarithm and of a shape over its size
+SURELY = 25.0  # cost by which another law must be better: 5 standard deviations squared
+FARTHEST = 30.0  # times what the best fit leaves: one that leaves more is under no law the right one
+SLIGHT = (
+    0.02  # systematic residual over noise below which one law is as good as another: it can hardly be seen
+)
+BETTER = 0.9  # of what is left beyond noise: less of it is worth another law than the first
+
+
+def in_best_laws(fits: list[Fit]) -> list[Fit]:
+    """The fits, best first, with the effect that came last under that law of its mechanism that leaves least.
+
+    Nothing is tried where the best fit leaves too little to be seen. The best one is first fitted to its end under its
+    own law: another law would else explain what that fit has not reached yet.
+    """
+    if not fits or remaining(fits[0]) < SLIGHT:
+        return fits
+    if len(last(fits[0]).laws) > 1:
+        fits = sorted([fitting.polished(fits[0]), *fits[1:]], key=cost)
+        if remaining(fits[0]) < SLIGHT:
+            return fits
+    others = raced([item for item in fits if excess(item) <= FARTHEST * excess(fits[0])])
+    better = sorted((others.get(item.names[-1], item) for item in fits), key=cost)
+    return ending(better, fits)
+
+
+def ending(better: list[Fit], fits: list[Fit]) -> list[Fit]:
+    """Fits, best first, with those that lead under another law than in `fits` moved to the bottom of their valley."""
+    done: list[Fit] = []
+    while better and not any(better[0] is item for item in (*fits, *done)):
+        done.append(settled(better[0]))
+        better = sorted([done[-1], *better[1:]], key=cost)
+    return better
+
+
+def raced(fits: list[Fit], most: float = math.inf) -> dict[str, Fit]:
+    """The fits whose last effect leaves less under another law than the first, by that effect.
+
+    The laws of all effects are fitted for a few steps, and those that then lead to their end, unless they leave more
+    than `most` or far more than the best of the fits.
+    """
+    firsts = {item.names[-1]: item for item in reversed(fits)}
+    starts = [start for item in firsts.values() for start in begun(item)]
+    most = min(most, FARTHEST * min(map(excess, fits)))
+    found: dict[str, list[Fit]] = {}
+    with ThreadPoolExecutor(WORKERS) as pool:
+        rough = sorted(pool.map(lambda start: fitted(start, ROUGH, 1), starts), key=cost)
+        leading = [item for item in rough[:LEADING] if excess(item) <= most]
+        for item in pool.map(lambda item: fitted(item, STEPS, ROUNDS), leading):
+            found.setdefault(item.names[-1], []).append(item)
+    chosen = {name: simplest(firsts[name], others) for name, others in found.items()}
+    return {name: item for name, item in chosen.items() if item is not firsts[name]}
+
+
+def fitted(start: Fit, steps: int, rounds: int) -> Fit:
+    """A fit moved on by a few steps."""
+    return fitting.fit(start.data, start.values, start.z, steps, rounds=rounds)
+
+
+def simplest(first: Fit, others: list[Fit]) -> Fit:
+    """The first fit, or one under another law: with more free parameters only where it is much better."""
+    best = first
+    for item in sorted(others, key=lambda item: len(Problem(item.data, item.values).frees)):
+        if item.cost < best.cost - SURELY and excess(item) < BETTER * excess(best):
+            best = item
+    return best
+
+
+def begun(fit: Fit) -> list[Fit]:
+    """The fit with its last effect under further laws, where a fit of each starts best: those with the best starts."""
+    way = path(fit.data.part)
+    models = sorted({law.model for law in last(fit).laws[1:] if law.model}) if way is not None else []
+    known = tuple(item.tobytes() for item in way) if way is not None else ()
+    followed = {model: following(model, *known).parameters for model in models}
+    places = range(1, len(last(fit).laws))
+    return sorted((begun_under(fit, place, followed) for place in places), key=cost)[:FITTED]
+
+
+def begun_under(fit: Fit, place: int, followed: Mapping[str, Mapping[str, float]]) -> Fit:
+    """The fit with its last effect under the law at a place of its laws, where a fit of it starts best.
+
+    From the plan's parameters, as those of a fit under a wrong law mean nothing. `followed` are the parameters with
+    which models of specimens follow the measured path, by model.
+    """
+    effect = last(fit)
+    begun = (
+        fitting.at(fit.data, fit.values | {effect.name: values}, np.zeros(fit.z.size))
+        for values in starts(fit, effect, place, followed)
+    )
+    return min(begun, key=cost)
+
+
+def last(fit: Fit) -> Effect:
+    """The effect of a fit that came last."""
+    return fit.data.catalogue[fit.names[-1]]
+
+
+def cost(fit: Fit) -> float:
+    """The figure by which fits are ranked."""
+    return fit.cost
+
+
+def settled(fit: Fit) -> Fit:
+    """The fit at the bottom of its valley, which is narrow and bent: by a simplex, which needs no slopes."""
+    for _ in range(TURNS):
+        problem, z = Problem(fit.data, fit.values), fit.z
+        start = problem.place(fit.values, z)
+        count = problem.count
+        corners = np.tile(start[count:], (start.size - count + 1, 1))
+        steps = [LOGARITHMIC if item.logarithmic else LINEAR for item in problem.frees]
+        corners[1:] += np.diag(steps)
+
+        def cost_of(free: Array, problem: Problem = problem, z: Array = z) -> float:
+            values = problem.values(np.concatenate([z, free]))
+            return fitting.at(problem.data, values, z).cost
+
+        options = {"initial_simplex": corners, "maxfev": EVALUATIONS, "fatol": 1.0, "xatol": 1e-4}
+        found = minimize(cost_of, start[count:], method="Nelder-Mead", options=options).x
+        values = problem.values(np.concatenate([z, found]))
+        fit = min(
+            (fit, fitting.fit(fit.data, values, z, STEPS, rounds=1), fitting.at(fit.data, values, z)),
+            key=lambda item: item.cost,
+        )
+    return fit

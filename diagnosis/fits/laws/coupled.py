@@ -1,0 +1,101 @@
+"""Effects that one model of a specimen holds together, fitted at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.fits import fitting, hypothesis
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.laws.best import FITTED, ROUNDS, cost, fitted, settled
+from diagnosis.fits.laws.specimen import as_specimen, following, path, within
+from diagnosis.fits.unexplained import leaves
+from laboratories.effects.effect import Effect
+from models.specimens.fit import SpecimenFit
+
+# Of a force's rms that the best fit leaves: what a model of force over deformation leaves by itself, from which on its
+# effects are fitted in the laboratory. That model knows no speed, which made up a quarter of the rest of a damper.
+NEARLY = 1.5
+# Of the force's rms: a second fault of an ordinary laboratory leaves less of a force than this, a specimen of another
+# kind than the planned one left 9 to 30 %.
+MUCH = 0.05
+LONG = 20  # steps of such a fit
+BEYOND = 2.0  # times the largest force measured: a slider's own one is passed on before it slides
+TOGETHER = 2  # of such fits, those that are fitted to their end
+STIFFNESS = "column.stiffness"  # what a law with the planned stiffness has beside it where that is wrong
+OTHERWISE = 1.25  # factor on the planned stiffness beyond which a law of yielding does not find its own way
+
+
+def coupled(fit: Fit, first: list[Fit]) -> list[Fit]:
+    """Fits with the effects that one model of a specimen holds, beside those with one effect, `first`, best first.
+
+    They are a slider behind play, and a law of yielding whose first stiffness is not the planned one. One by one such
+    effects explain little, so that a search does not reach them: without its play a slider reverses too early. Nor
+    does it reach yielding where its first law is far from the specimen's. They are tried where much of the force is
+    left and more than noise, and where the model follows the measured force about as well as the best fit known, or
+    better.
+    """
+    way, best = path(fit.data.part), first[0]
+    if way is None or not leaves(best):
+        return []
+    residual = best.data.residual(hypothesis.lay(best.data, best.z, best.values))[:, -1]  # of the force
+    left = float(np.sqrt(np.mean(np.square(residual)) / np.mean(np.square(way[1]))))
+    if left < MUCH:
+        return []
+    places = [
+        (effect, place)
+        for effect in fit.data.part.candidates
+        for place, law in enumerate(effect.laws)
+        if law.model and effect.name not in fit.names
+    ]
+    models = sorted({effect.laws[place].model for effect, place in places})
+    found = {model: following(model, *(item.tobytes() for item in way)) for model in models}
+    starts = [
+        (found[effect.laws[place].model].nrmse, beside(fit, effect, place, found[effect.laws[place].model]))
+        for effect, place in places
+    ]
+    tried = {item.names for item in first}
+    starts = [item for item in starts if item[0] < NEARLY * left and tuple(item[1]) not in tried]
+    known = sorted(starts, key=lambda item: item[0])
+    begun = [fitting.at(fit.data, fit.values | values, np.zeros(fit.z.size)) for _, values in known[:FITTED]]
+    leading = sorted(begun, key=cost)[:TOGETHER]
+    done = (settled(fitted(item, LONG, ROUNDS)) for item in leading)
+    return sorted((item for item in done if works(item, float(np.max(np.abs(way[1]))))), key=cost)
+
+
+def works(fit: Fit, force: float) -> bool:
+    """Whether all forces that effects of a fit need to act lie within `BEYOND` times the largest one measured, N.
+
+    A slider that never slides is a spring, which stands in for what bends.
+    """
+    catalogue = fit.data.catalogue
+    forces = [
+        values[item.name]
+        for name, values in fit.values.items()
+        for item in catalogue[name].parameters
+        if item.unit == "N" and not item.shape and item.null == 0.0
+    ]
+    return all(abs(value) <= BEYOND * force for value in forces)
+
+
+def beside(fit: Fit, effect: Effect, place: int, found: SpecimenFit) -> Values:
+    """An effect under a law and what its model holds beside it, from that model's parameters."""
+    catalogue, law = fit.data.catalogue, effect.laws[place]
+    (strength,) = (item for item in effect.parameters if not item.shape)
+    base = effect.under(place, effect.values({strength.name: 0.0}))
+    result = {effect.name: base | as_specimen(effect, law, strength, found.parameters)}
+    for name, renamed in law.beside.items():
+        other = catalogue[name]
+        index = next(
+            i for i, item in enumerate(other.laws) if set(item.shapes) <= set(renamed) and item.shapes
+        )
+        bounds = {item.name: item for item in other.every}
+        given = {key: within(bounds[key], found.parameters[value]) for key, value in renamed.items()}
+        result[name] = {"law": float(index)} | given
+    if law.beside:
+        return result
+    factor = found.parameters["stiffness"] / fit.data.system.plan.column.stiffness
+    if STIFFNESS not in catalogue or 1.0 / OTHERWISE < factor < OTHERWISE:
+        return result
+    (parameter,) = catalogue[STIFFNESS].parameters
+    return {STIFFNESS: {parameter.name: within(parameter, factor)}} | result

@@ -1,0 +1,65 @@
+"""The specimen of a part by itself: its force over its deformation, and the models that follow it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+
+from common.plan.kinds import COLUMN
+from diagnosis.recorded.joined import JoinedPart
+from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
+from laboratories.effects.effect import Effect, Law, Parameter
+from models.registry import Array
+from models.specimens import fit as specimens
+from models.specimens.fit import SpecimenFit
+
+
+def path(part: Part) -> tuple[Array, Array] | None:
+    """Measured deformation (m) and force (N) of a part's column, where both are there; None where there is none.
+
+    Of several recordings those of the one that goes farthest.
+    """
+    if isinstance(part, JoinedPart):
+        ways = [way for piece in part.pieces if (way := path(piece)) is not None]
+        return max(ways, key=lambda way: float(np.max(np.abs(way[0]))), default=None)
+    if isinstance(part, ColumnAlone):
+        there, deformation, force = part.present[:, 0], part.inputs, part.measured[:, 0]
+    elif isinstance(part, LaboratoryPart) and part.lab.kind.name == COLUMN:
+        there, (deformation, force) = np.all(part.present, axis=1), part.measured.T
+    else:
+        return None
+    if not (np.any(deformation[there]) and np.any(force[there])):
+        return None
+    return deformation[there], force[there]
+
+
+@lru_cache(maxsize=32)
+def following(model: str, deformation: bytes, force: bytes) -> SpecimenFit:
+    """A model of a specimen fitted to a path of deformation (m) and force (N); a search asks for it more than once."""
+    return specimens.fit(model, np.frombuffer(deformation), np.frombuffer(force))
+
+
+def as_specimen(
+    effect: Effect, law: Law, strength: Parameter, found: Mapping[str, float]
+) -> dict[str, float]:
+    """The parameters of an effect under a law from those of the specimen that it is."""
+    known = {item.name: item for item in effect.every}
+    values = dict(found)
+    if "first_bend" in values.keys() - law.shapes.keys():  # without it the law yields at the same force
+        bend = values["first_bend"]
+        values["yield_displacement"] *= bend + values["second_stiffness"] * (1.0 - bend)
+    if "push" in values:
+        push, pull = values["push"], values["pull"]
+        values |= {"force": 0.5 * (push + pull), "asymmetry": (push - pull) / (push + pull)}
+    names = (strength.name, *law.shapes)
+    return {
+        name: within(known[name], values.get(law.renamed.get(name, name), law.shapes.get(name, 0.0)))
+        for name in names
+    }
+
+
+def within(parameter: Parameter, value: float) -> float:
+    """A value within a parameter's bounds."""
+    return min(max(value, parameter.least), parameter.most)
