@@ -50,7 +50,9 @@ class ColumnEffects:
     centring_hardening: float = 0.05
     centring_loop: float = 0.5  # height of its flag over its force there
     stiffening: float = 0.0  # stiffness gained over the first one
-    stiffening_law: float = 0.0  # 0 with the square of the deformation, 1 from a bend on, 2 from two bends on
+    # 0 with the square of the deformation, 1 from a bend on, 2 from two bends on, 3 with another power
+    stiffening_law: float = 0.0
+    stiffening_exponent: float = 2.0  # of law 3
     stiffening_bend: float = 1e-3  # m
     stiffening_second: float = 0.0  # stiffness gained from a second bend on
     stiffening_second_bend: float = 2e-3  # m

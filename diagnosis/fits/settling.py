@@ -17,6 +17,7 @@ from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import screen
 from diagnosis.fits.sensor_noise import quieter
 from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, gaps, leaves, model_error
+from diagnosis.fits.worth import is_gap
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 
@@ -153,12 +154,13 @@ def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
 
     What is taken for coloured noise may be an effect, at rest as in motion: effects are fitted under white noise,
     and the best is taken if the data are far more probable under it and the noise that it leaves. Without such an
-    effect the list is empty.
+    effect the list is empty. Where nominal parameters are at the ends of their tolerances as well, and the noise is
+    far louder than a sensor's, effects are also fitted under their further laws.
     """
     if not sensor_noise.coloured(bare.data):
         return bare, []
     fits = in_white_noise(bare, scales)
-    if fits and is_loud(bare) and not far_likelier(remodelled(fits[0]), bare):
+    if fits and is_loud(bare) and is_gap(bare) and not far_likelier(remodelled(fits[0]), bare):
         fits = candidates.best_laws(fitting.at(sensor_noise.whitened(bare), {}, bare.z), scales)
     if not fits or not far_likelier(remodelled(fits[0]), bare):
         return bare, []

@@ -26,7 +26,7 @@ PRESENT, STIFFNESS, YIELDS, DEGRADATION, PINCHING, PINCHING_WIDTH, PINCHING_HARD
 FRICTION, PRESLIDING, VISCOUS, INERTIA, SLIP, FRICTION_VELOCITY = range(7, 13)
 ASYMMETRY, DROP, SPEED, PLAY, BESIDE, CENTRES, STIFFENING, BEND = range(13, 21)
 SECOND_STIFFENING, SECOND_BEND, PINCHING_TAILS, SLIDES, CORNER = range(21, 26)
-POWER, DASHPOT, EXPONENT, SPRING, RELAXING = range(26, 31)
+POWER, DASHPOT, EXPONENT, SPRING, RELAXING, STIFFENING_POWER = range(26, 32)
 
 # places in `cell`; the last three are the specimen's place within play, the force that it carried there, and the force
 # of a dashpot behind a spring
@@ -47,7 +47,7 @@ LAWS = (
 PLAYS = ORIGIN, RESTING, HELD, PARTLY, ROUNDED = range(5)  # where the gap is: see `column.slip`
 IN_PLACE = 2  # of `ColumnEffects.friction_law`: a slider in the place of the planned specimen
 BY_POWER, DASHPOT_IN_PLACE, DASHPOT_BESIDE = 1, 2, 3  # of `ColumnEffects.viscous_law`
-TWICE = 2  # of `ColumnEffects.stiffening_law`: with two bends
+BENT, TWICE, TO_A_POWER = 1, 2, 3  # of `ColumnEffects.stiffening_law`
 STIFFENED_AT = 2e-3  # m, reference deformation of hardening with the square of the deformation
 DEGRADED_AT = (
     2e-3  # m, reference deformation of degradation, at which 63 % of the stiffness is lost that will be
@@ -79,7 +79,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
     more = replace(more, viscous=more.viscous - power + column.damping, inertia=more.inertia + column.mass)
     code, params, memory = specimens.pack(column.model, stiffness=column.stiffness, **column.parameters)
     yields, centres = np.isfinite(more.yield_displacement), np.isfinite(more.centring)
-    bend = more.stiffening_bend if more.stiffening_law else 0.0
+    bend = more.stiffening_bend if more.stiffening_law in (BENT, TWICE) else 0.0
     vacant = not (yields or centres)  # one law takes the place of the planned specimen
     slides = bool(vacant and more.friction_law == IN_PLACE and more.friction)
     values = [
@@ -114,6 +114,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         more.viscous_exponent,
         more.viscous_stiffness,
         power if more.viscous_law == DASHPOT_BESIDE else 0.0,
+        more.stiffening_exponent if more.stiffening_law == TO_A_POWER else 2.0,
     ]
     law = np.array(more.learned)
     return Specimen(
@@ -243,9 +244,11 @@ def carried(specimen: Specimen, within: float, rate: float, step: float) -> floa
         result += self_centring.step(specimen.centring, specimen.centred, within) - elastic
     if effects[STIFFENING] != 0.0:
         bend = effects[BEND]
-        square = within * within / (STIFFENED_AT * STIFFENED_AT)
-        beyond = within - min(max(within, -bend), bend)
-        result += effects[STIFFENING] * (beyond if bend > 0.0 else square * within)
+        if bend > 0.0:
+            stiffened = within - min(max(within, -bend), bend)
+        else:
+            stiffened = within * (abs(within) / STIFFENED_AT) ** effects[STIFFENING_POWER]
+        result += effects[STIFFENING] * stiffened
     if effects[SECOND_STIFFENING] != 0.0:
         farther = effects[SECOND_BEND]
         result += effects[SECOND_STIFFENING] * (within - min(max(within, -farther), farther))

@@ -243,6 +243,17 @@ def test_a_hardening_column_follows_its_formulas(share: float, bend: float, wher
     assert bent == pytest.approx(K * (where + share * beyond), abs=1e-6)
 
 
+@pytest.mark.parametrize("share", [-0.2, 0.5])
+def test_hardening_with_a_power_is_nearly_that_of_a_sine_hyperbolicus(share: float) -> None:
+    """`6·share·s·(sinh(δ/s) − δ/s)` over 3 mm, s = 2 mm: a power of 2.138 misses 0.42 % of its rms, a cube 2.0 %."""
+    path = np.linspace(-3e-3, 3e-3, 301)
+    sine = 6.0 * share * 2e-3 * (np.sinh(path / 2e-3) - path / 2e-3)
+    fitted = share * 6.0 * 0.41735 / 1.5**2.13779
+    more = ColumnEffects(stiffening=fitted, stiffening_law=3.0, stiffening_exponent=2.13779)
+    got = np.array([specimen_under(np.array([x]), more)[0] for x in path]) / K - path
+    assert float(np.sqrt(np.mean((got - sine) ** 2) / np.mean(sine**2))) < 0.01
+
+
 @pytest.mark.parametrize("where", [-3e-3, -1.5e-3, 5e-4, 2.5e-3])
 def test_hardening_with_two_bends_consists_of_three_lines(where: float) -> None:
     more = ColumnEffects(
