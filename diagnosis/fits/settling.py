@@ -159,9 +159,18 @@ def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
     """
     if not sensor_noise.coloured(bare.data):
         return bare, []
-    fits = in_white_noise(bare, scales)
-    if fits and is_loud(bare) and is_gap(bare) and not far_likelier(remodelled(fits[0]), bare):
-        fits = candidates.best_laws(fitting.at(sensor_noise.whitened(bare), {}, bare.z), scales)
+    bare, found = far_likelier_ones(bare, in_white_noise(bare, scales))
+    if not found and is_loud(bare) and is_gap(bare):
+        white = fitting.at(sensor_noise.whitened(bare), {}, bare.z)
+        bare, found = far_likelier_ones(bare, candidates.best_laws(white, scales))
+    return bare, found
+
+
+def far_likelier_ones(bare: Fit, fits: list[Fit]) -> tuple[Fit, list[Fit]]:
+    """The fit without effects, and fits with one, best first, under the noise that the best of these leaves.
+
+    The list is empty where the data are not far more probable under the best one and that noise.
+    """
     if not fits or not far_likelier(remodelled(fits[0]), bare):
         return bare, []
     best, bare = settled(fits[0], bare.data), as_near(bare, fits[0])
