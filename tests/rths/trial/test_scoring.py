@@ -92,6 +92,14 @@ def test_the_true_effect_at_its_site_is_right() -> None:
     assert outcome.seconds == 4.0
 
 
+@pytest.mark.parametrize(("before", "judges"), [(0.281, False), (0.5, True)])
+def test_a_second_motion_that_hardly_shows_the_gap_judges_no_share(before: float, judges: bool) -> None:
+    what = replace(case("material", SLIP), other={"test": {}})
+    far = bare("explained")["how_far"] | {"before": before, "after": 0.28, "closed": 0.0, "noise_floor": 0.28}
+    outcome = judged(what, answer("explained", "column.slip", site="column", how_far=far))
+    assert outcome.twice is judges
+
+
 def test_another_effect_is_wrong_and_the_reason_is_given() -> None:
     outcome = judged(case("catalogue", RUB), answer("explained", "column.slip", site="column"), 1.0)
     assert not outcome.right

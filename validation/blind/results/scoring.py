@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from common.plan import read as plans
+from diagnosis.report.records import Report
 from diagnosis.report.values import Value
 from validation.blind.best import best_closed
 from validation.blind.cases.case import Case, Laid
@@ -34,6 +35,7 @@ VISIBLE = 2.0  # residual to noise from which an effect must be found: below it 
 AS_MUCH = {
     "butterworth": "delay"
 }  # a Butterworth low-pass resembles a pure delay as much as the catalogue's lag
+HARDLY = 1.1  # times its noise floor, which rests on two noisy simulations, from which on a gap stands out
 STANDARD_LENGTH = 30.0  # s of test that the time of a diagnosis is scaled to
 
 
@@ -163,13 +165,22 @@ def judge(case: Case, recorded: RecordedCase, answer: DiagnosisAnswer) -> Outcom
         listed=len(listed),
         separation=recorded.separation,
         closed=closed,
-        twice=bool(case.other),
+        twice=bool(case.other) and stands_out(answer.reports.values()),
         estimates=estimates(case, heard, names) if named else [],
         shrinkage=0.0 if math.isnan(closed) else closed / best,
         seconds=answer.seconds * STANDARD_LENGTH / float(case.plan["test"]["duration"]),
         signs=next((one.signs for one in asked if one.names), {}),
     )
     return outcome if right else replace(outcome, why=why(outcome, answer.error))
+
+
+def stands_out(reports: Iterable[Report]) -> bool:
+    """Whether the gap of the motion that judges stands out of its noise: where it does not, nothing can close.
+
+    A weak second motion leaves a column elastic that yielded under the first. Reports without figures count as well.
+    """
+    far = [(one.how_far.before, one.how_far.noise_floor) for one in reports]
+    return not far or any(before is None or floor is None or before > HARDLY * floor for before, floor in far)
 
 
 def report_on(item: Laid, heard: Sequence[Heard]) -> Heard | None:
