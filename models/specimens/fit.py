@@ -125,6 +125,7 @@ FREE: dict[str, dict[str, SearchRange]] = {
         "yield_displacement": YIELDING,
         "hardening": HARDENING,
         "sharpness": SearchRange(1.0, 50.0, (5.0, 18.0)),
+        "loss": SearchRange(0.0, 0.98, (0.9,), log=False),
     },
     "trilinear": SKELETON,
     "pinched": PINCHED,

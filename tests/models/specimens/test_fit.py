@@ -35,6 +35,25 @@ TRUE: dict[str, dict[str, float]] = {
         "crack_displacement": 0.3 * DY,
         "closing": 0.2,
     },
+    "menegotto_pinto": {
+        "stiffness": K,
+        "yield_displacement": DY,
+        "hardening": 0.05,
+        "sharpness": 12.0,
+        "loss": 0.8,
+    },
+    "pinched": {
+        "stiffness": K,
+        "yield_displacement": DY,
+        "hardening": 0.05,
+        "first_bend": 0.5,
+        "second_stiffness": 0.4,
+        "pinch_force": 0.3,
+        "pinch_displacement": 0.6,
+        "unloading": 0.3,
+        "damage": 0.02,
+        "asymmetry": -0.2,
+    },
 }
 DEGRADING = {
     "stiffness": K,
