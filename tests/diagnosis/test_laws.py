@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from common.plan.plan import Plan
@@ -11,7 +13,9 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import in_best_laws
 from diagnosis.fits.laws.specimen import path
+from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.residuals import Data
+from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import alone, simplest
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.nuisances import Nuisance
@@ -106,6 +110,35 @@ class Cracked(ColumnAlone):
         force = K * self.inputs * (1.0 - 0.3 * weight + 0.2 * (1.0 - weight))
         self.measured = (force + NOISE * np.random.default_rng(4).standard_normal(TICKS))[:, None]
         self.present = np.ones((TICKS, 1), dtype=bool)
+
+
+class Bent(Cracked):
+    """A column alone that is elastic and loses half of its stiffness beyond 1.5 mm."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.candidates = (CATALOGUE["column.hardening"],)
+        beyond = self.inputs - np.clip(self.inputs, -1.5e-3, 1.5e-3)
+        self.measured = K * (self.inputs - 0.5 * beyond)[:, None]
+
+
+class Sizes(Scales):
+    """The sizes of the catalogue, without a record to scale them by."""
+
+    def __init__(self) -> None:
+        pass
+
+    def starts(self, effect: Effect) -> Iterator[tuple[tuple[float, ...], dict[str, float]]]:
+        (strength,) = (item for item in effect.parameters if not item.shape)
+        yield from (((), effect.values({strength.name: size})) for size in strength.sizes)
+
+
+def test_a_law_behind_the_first_starts_on_the_side_that_promises() -> None:
+    bare = fitting.fit(data_of(Bent()), {})
+    best = unlike_first(bare, Sizes())[0]
+    assert best.effect.laws[int(best.values["law"])].name == "with a bend"
+    assert best.values["share"] < 0.0
+    assert fitting.at(bare.data, {best.effect.name: best.values}, bare.z).cost < bare.cost
 
 
 def cracked(values: Values) -> Fit:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 
 from diagnosis.fits import fitting
@@ -30,8 +31,11 @@ def unlike_first(fit: Fit, scales: Scales) -> list[ScreenedEffect]:
         change = (
             fitting.at(fit.data, fit.values | {effect.name: values}, fit.z).reduced - fit.reduced
         ).ravel()
-        gain, _, z = plane.gain(change, scales.stretch(effect))
-        return ScreenedEffect(effect, values, z, gain)
+        gain, share, z = plane.gain(change, scales.stretch(effect))
+        start = scales.stretched(
+            effect, values, math.copysign(1.0, share)
+        )  # as large, to the side that promises
+        return ScreenedEffect(effect, start, z, gain)
 
     def best(way: tuple[Effect, int]) -> list[ScreenedEffect]:
         found = [promised(way[0], values) for values in gridded(fit, *way, scales)]
