@@ -20,13 +20,13 @@ from diagnosis.fits.screening import WORKERS, ScreenedEffect, screen
 from diagnosis.fits.unexplained import MATERIAL, remaining
 from diagnosis.fits.worth import LOUD
 
-# Effort: a fit takes many predictions of the part, a projection few.
-# Of what a fit leaves: an effect that promises more is near the cause. Of tables with play behind their loop the best
-# other effect promised 1 to 5 %, play before the loop 0.2 %, and play behind it 60 to 80 %.
+# Of what a fit leaves: an effect that promises more is near the cause. Of two tables with play behind their loop the
+# best other effect promised 2 and 5 %, play before the loop at most 0.2 %, and play behind it 5 and 33 %.
 LITTLE = 0.5
-FAR_MORE = (
-    2.0  # times what the first law promises: laws that differ in detail promise the same within a tenth
-)
+# Times what the first law promises: a law that differs from it in detail only, as friction by direction and speed,
+# promises no more.
+FAR_MORE = 2.0
+# Effort: a fit takes many predictions of the part, a projection few.
 FITTED = 6  # candidates of the projection that are fitted at every step
 FINE = 3  # of these, candidates that are fitted to their end,
 HOPELESS = 30.0  # as long as they leave no more than this times what the best one leaves

@@ -16,7 +16,7 @@ from diagnosis.fits import candidates, fitting, worth
 from diagnosis.fits.candidates import TIED
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Problem, left_out
-from diagnosis.fits.laws.best import raced, settled
+from diagnosis.fits.laws.best import descended, raced
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.unexplained import leaves
 
@@ -109,7 +109,7 @@ def under_others(fit: Fit) -> list[Fit]:
             less = fitting.fit(fit.data, rest | {name: fit.values[name]}, fit.z)
             result += raced([less], NEARING * excess(less)).values()
     near = [item for item in result if excess(item) < CLOSE * max(excess(fit), TIED)]
-    return [settled(item) for item in near]
+    return [descended(item) for item in near]
 
 
 def parted(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:

@@ -54,7 +54,7 @@ def ending(better: list[Fit], fits: list[Fit]) -> list[Fit]:
     """Fits, best first, with those that lead under another law than in `fits` moved to the bottom of their valley."""
     done: list[Fit] = []
     while better and not any(better[0] is item for item in (*fits, *done)):
-        done.append(settled(better[0]))
+        done.append(descended(better[0]))
         better = sorted([done[-1], *better[1:]], key=cost)
     return better
 
@@ -126,7 +126,7 @@ def cost(fit: Fit) -> float:
     return fit.cost
 
 
-def settled(fit: Fit) -> Fit:
+def descended(fit: Fit) -> Fit:
     """The fit at the bottom of its valley, which is narrow and bent: by a simplex, which needs no slopes."""
     for _ in range(TURNS):
         problem, z = Problem(fit.data, fit.values), fit.z

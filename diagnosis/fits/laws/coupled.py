@@ -1,4 +1,4 @@
-"""Effects that one model of a specimen holds together, fitted at once."""
+"""Effects that a model of a specimen holds, fitted at once from its force over deformation."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
-from diagnosis.fits.laws.best import FITTED, ROUNDS, cost, fitted, settled
+from diagnosis.fits.laws.best import FITTED, ROUNDS, cost, descended, fitted
 from diagnosis.fits.laws.specimen import as_specimen, following, path, within
 from diagnosis.fits.unexplained import leaves
 from laboratories.effects.effect import Effect
@@ -23,7 +23,7 @@ LONG = 20  # steps of such a fit
 BEYOND = 2.0  # times the largest force measured: a slider's own one is passed on before it slides
 TOGETHER = 2  # of such fits, those that are fitted to their end
 STIFFNESS = "column.stiffness"  # what a law with the planned stiffness has beside it where that is wrong
-OTHERWISE = 1.25  # factor on the planned stiffness beyond which a law of yielding does not find its own way
+OTHERWISE = 1.25  # factor on the planned stiffness beyond which that effect stands beside a law of yielding
 
 
 def coupled(fit: Fit, first: list[Fit]) -> list[Fit]:
@@ -59,7 +59,7 @@ def coupled(fit: Fit, first: list[Fit]) -> list[Fit]:
     known = sorted(starts, key=lambda item: item[0])
     begun = [fitting.at(fit.data, fit.values | values, np.zeros(fit.z.size)) for _, values in known[:FITTED]]
     leading = sorted(begun, key=cost)[:TOGETHER]
-    done = (settled(fitted(item, LONG, ROUNDS)) for item in leading)
+    done = (descended(fitted(item, LONG, ROUNDS)) for item in leading)
     return sorted((item for item in done if works(item, float(np.max(np.abs(way[1]))))), key=cost)
 
 
