@@ -15,7 +15,7 @@ from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import logger, readings, report, where
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
+from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
@@ -114,15 +114,15 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         if isinstance(found.data.part, LoggedBuilding):
             late = found.data.part.late(found.chosen.z)
     searches = [item.search for item in verdicts]
-    final, held = [item.data for item in searches], readings.held(record, rounded)
-    sharp = readings.levels(final, list(map(sharpest, searches)))
+    final, held = [item.data for item in searches], readings.held(record, steps)
+    noises = readings.levels(final, list(map(heard, searches)))
     result = Diagnosis(
         record,
         verdicts,
-        readings.findings(record, sharp, rounded, logged=late is not None),
+        readings.findings(record, noises, rounded, steps, logged=late is not None),
         exchanged(record),
         {} if late is not None else held,  # a logger's steps repeat samples too
-        readings.levels(final, list(map(heard, searches))),
+        readings.floors(noises, steps),
         [
             *together(more),
             *of_plan(record),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +11,7 @@ import numpy as np
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
-from diagnosis.signals.noise import quantum
+from diagnosis.signals.noise import quantum, quantum_between
 from models.registry import Array
 
 # A sensor counts as too noisy from LOUDER times the noise that the plan and the other sensors make expected, and from
@@ -69,27 +71,40 @@ def steps(record: Record) -> dict[str, float]:
     return found
 
 
-def resolutions(record: Record, rounded: dict[str, float]) -> dict[str, float]:
-    """Rounding steps by signal: the resolution stated for a channel, replaced by the step found in its samples."""
+def stated_steps(record: Record) -> dict[str, float]:
+    """The resolution stated for channels in an import map, by signal."""
     stated = record.stated
     if stated is None:
-        return rounded
+        return {}
     rows = {
         given: stated.channel(lab.role, name).resolution
         for lab in record.labs
         for name, given in zip(lab.kind.channels.names, lab.measured, strict=True)
     }
-    return {name: step for name, step in rows.items() if step > 0.0} | rounded
+    return {name: step for name, step in rows.items() if step > 0.0}
 
 
-def held(record: Record, rounded: dict[str, float]) -> dict[str, float]:
+def resolutions(record: Record, rounded: dict[str, float]) -> dict[str, float]:
+    """Rounding steps by signal: `rounded`, or that from before an interpolation, or the one stated for a channel.
+
+    The second is a logger's, and so no error of a sensor.
+    """
+    found = stated_steps(record)
+    for name in read_by(record):
+        if name not in rounded and record.has(name):
+            step = quantum_between(record.signals[name][record.present[name]])
+            found |= {name: step} if step > 0.0 else {}
+    return found | rounded
+
+
+def held(record: Record, steps: Mapping[str, float]) -> dict[str, float]:
     """Share of samples exactly equal to the one before, by sensor; only of sensors whose noise rules that out.
 
-    A channel that was interpolated onto the ticks has the equal samples of a rounded one, but no step.
+    It does not of those with `steps`. Of a channel that was interpolated onto the ticks these may not be known.
     """
     found, between = {}, interpolated(record)
     for name in read_by(record):
-        if name in rounded or name in between:
+        if name in steps or name in between:
             continue
         if record.has(name) and np.ptp(record.signals[name]) > 0.0:
             there = record.signals[name][record.present[name]]
@@ -127,6 +142,16 @@ def levels(datas: list[Data], noises: list[Array] | None = None) -> dict[str, fl
     }
 
 
+def floors(noise: Mapping[str, float], steps: Mapping[str, float]) -> dict[str, float]:
+    """Rms noise of every reading, no less than what rounding to its step makes."""
+    return {name: max(level, steps.get(name, 0.0) / math.sqrt(12.0)) for name, level in noise.items()}
+
+
+def beside_rounding(white: float, step: float) -> float:
+    """Rms noise of a reading without that of its rounding to a step; 0 where the step hides it."""
+    return math.sqrt(white**2 - step**2 / 12.0) if white > step else 0.0
+
+
 def coarsest(record: Record, rounded: dict[str, float]) -> dict[str, float]:
     """Largest step that the logger's own rounding explains, by signal; empty unless most readings are rounded.
 
@@ -150,24 +175,30 @@ def coarsest(record: Record, rounded: dict[str, float]) -> dict[str, float]:
 
 
 def findings(
-    record: Record, white: dict[str, float], rounded: dict[str, float], *, logged: bool = False
+    record: Record,
+    white: dict[str, float],
+    rounded: dict[str, float],
+    steps: Mapping[str, float],
+    *,
+    logged: bool = False,
 ) -> list[SensorFinding]:
     """Sensors that round coarsely, and sensors that are far noisier than planned and than the other ones.
 
-    Where a logger recorded (`logged`), noise as small as that of its converter is the logger's.
+    `rounded` are the steps of `steps` that a sensor may have made; `white` is the rms noise. Where a logger recorded
+    (`logged`), noise as small as that of its converter is the logger's.
     """
     planned = {name: level for lab in record.labs for name, level in lab.noise.items() if level > 0.0}
     # A value that is only stated has no noise.
     read = {name for name in white if np.ptp(record.signals[name]) > 0.0}
-    plain = [name for name in white if name in read & planned.keys() and name not in rounded]
-    ratios = {name: white[name] / planned[name] for name in plain}
+    noise = {name: beside_rounding(level, steps.get(name, 0.0)) for name, level in white.items()}
+    ratios = {name: noise[name] / planned[name] for name in noise if name in read & planned.keys() and noise[name]}
     usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, LEAST_SCALE)
     result = []
-    coarse = coarsest(record, rounded) | resolutions(record, {})
+    coarse = coarsest(record, rounded) | stated_steps(record)
     for name, step in rounded.items():
-        noise = planned.get(name, 0.0) * usual
-        if step > SAME * max(noise, coarse.get(name, 0.0)):
-            size = step / np.sqrt(12.0) / noise if noise > 0.0 else 0.0
+        expected = planned.get(name, 0.0) * usual
+        if step > SAME * max(expected, coarse.get(name, 0.0)):
+            size = step / np.sqrt(12.0) / expected if expected > 0.0 else 0.0
             bounds = ((1.0 - STEP_ERROR) * step, (1.0 + STEP_ERROR) * step)
             result.append(SensorFinding(effect_on(record, name, "quantization"), "step", step, bounds, size))
     if not record.has("displacement"):  # the plan's sensors may be another laboratory's
@@ -175,10 +206,10 @@ def findings(
     for name, ratio in ratios.items():
         others = [value for key, value in ratios.items() if key != name]
         expected = float(np.median(others)) if others else 1.0
-        if logged and white[name] < CONVERTER * float(np.max(np.abs(record.signals[name]))):
+        if logged and noise[name] < CONVERTER * float(np.max(np.abs(record.signals[name]))):
             continue
         if ratio > LOUDER * max(expected, QUIETEST) and ratio > LEAST:
-            value = float(np.sqrt(max(white[name] ** 2 - (expected * planned[name]) ** 2, 0.0)))
+            value = float(np.sqrt(max(noise[name] ** 2 - (expected * planned[name]) ** 2, 0.0)))
             bounds = ((1.0 - NOISE_ERROR) * value, (1.0 + NOISE_ERROR) * value)
             result.append(
                 SensorFinding(effect_on(record, name, "noise"), "rms", value, bounds, ratio / expected)

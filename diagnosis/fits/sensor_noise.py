@@ -279,7 +279,9 @@ def model(data: Data, rest: Remainder, part: QuietPart, place: int) -> NoiseMode
     lines = pickup.named(rest.found[place])
     resolution = float(data.rounded[place])
     segments = stretches(rest.noise[:, place], quiet)
-    stepping = resolution > residuals.STEPPING * flat  # counts by itself, and more than noise of its size
+    heard = float(rest.single[:, place][np.repeat(quiet, data.group)].std())
+    # steps that no noise hides count by themselves, and more than noise of their size
+    stepping = resolution > residuals.STEPPING * max(flat, heard)
     if stepping or not segments or not np.any(rest.noise[:, place]):
         return NoiseModel(flat, lines=lines, resolution=resolution)
     if alike(rest.noise[:, place], quiet):

@@ -22,8 +22,9 @@ from models.registry import Array
 
 FAR = 90.0  # factor from which on it is a slip: cm for m makes 100, while 9.81 for g may be a wrong model
 ALIKE = 0.5  # correlation from which on two signals have the same shape: that of sines 60° apart
-# correlation, negative, from which on a sign is wrong: sines 143° apart; less may be a wrong phase.
-OPPOSED = 0.8
+# correlation, negative, from which on a sign is wrong: sines 154° apart; less may be a wrong phase, or a mass that
+# bounces off a stop.
+OPPOSED = 0.9
 LONGEST_LAG = 0.1  # s, delay within which shapes are compared: several times that of actuators and filters
 ABOVE_NOISE = 10.0  # rms over the sensor's noise without which the shape of a reading is not compared
 USUAL = {1e3: "a factor of 1000", 1e2: "a factor of 100", 1e6: "a factor of a million"}

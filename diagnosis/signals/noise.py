@@ -11,6 +11,11 @@ from models.registry import Array
 
 ROUNDING = 4.0 * float(np.finfo(np.float64).eps)  # of a value, relative to the largest
 COARSE = 1e3  # roundings that a step must exceed
+# Levels from which on they tell of a step: the two gaps between three free floats have no common divisor.
+LEVELS = 3
+# Share of levels that must be multiples of a step, and how many times too large their first guess may be.
+MOST, TIMES = 0.8, 12
+ALIGNED = 1e-6  # of a step, within which a value counts as a multiple: far more than the rounding of floats
 
 
 def quantum(x: Array) -> float:
@@ -34,6 +39,28 @@ def quantum(x: Array) -> float:
     step = float(np.polyfit(places, levels - levels[0], 1)[0])
     off = levels - levels[0] - places * step
     return step if float(np.max(np.abs(off))) <= 4.0 * rounding else 0.0
+
+
+def quantum_between(x: Array) -> float:
+    """Step of a signal (n,) that was rounded to one and then interpolated linearly; in x's unit.
+
+    Between two equal samples a straight line has their value, so that most equal neighbours are multiples of the step,
+    and nearly all that occur again. Zero where these are too few or have none, as where a sensor repeats samples.
+
+    Raises:
+        InputError: empty or not finite.
+    """
+    checked(signal=x)
+    levels, counts = np.unique(x[1:][np.diff(x) == 0.0], return_counts=True)
+    sure = levels[counts > 1] if np.count_nonzero(counts > 1) >= LEVELS else levels
+    coarse = quantum(sure) if sure.size >= LEVELS else 0.0
+    if coarse == 0.0:
+        return 0.0
+    for part in range(1, TIMES + 1):
+        places = (levels - sure[0]) / (coarse / part)
+        if np.mean(np.abs(places - np.round(places)) < ALIGNED) >= MOST:
+            return coarse / part
+    return 0.0
 
 
 def merged(x: Array, rounding: float) -> Array:

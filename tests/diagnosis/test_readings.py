@@ -22,7 +22,7 @@ def found_in(whole: Record) -> list[SensorFinding]:
     """Findings as a diagnosis makes them."""
     steps = readings.steps(whole)
     datas = [residuals.prepare(kind(whole), whole, steps) for kind in (lab_a, lab_b)]
-    return readings.findings(whole, readings.levels(datas), steps)
+    return readings.findings(whole, readings.levels(datas), steps, readings.resolutions(whole, steps))
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_sensors_that_are_all_equally_noisier_than_planned_give_no_finding(cases
     whole = cases.record(duration=8.0)
     datas = [residuals.prepare(kind(whole), whole) for kind in (lab_a, lab_b)]
     loud = {name: 1.9 * level for name, level in readings.levels(datas).items()}
-    assert readings.findings(whole, loud, {}) == []
+    assert readings.findings(whole, loud, {}, {}) == []
 
 
 def test_rounding_shared_by_all_readings_of_a_unit_is_attributed_to_the_logger(cases: Cases) -> None:
@@ -80,8 +80,8 @@ def test_noise_of_a_converter_is_attributed_to_the_logger(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
     levels = readings.levels([residuals.prepare(kind(whole), whole) for kind in (lab_a, lab_b)])
     loud = levels | {"damper_stroke": 6e-4 * float(np.max(np.abs(whole.signals["damper_stroke"])))}
-    assert [item.effect for item in readings.findings(whole, loud, {})] == ["sensor.damper_stroke.noise"]
-    assert readings.findings(whole, loud, {}, logged=True) == []
+    assert [item.effect for item in readings.findings(whole, loud, {}, {})] == ["sensor.damper_stroke.noise"]
+    assert readings.findings(whole, loud, {}, {}, logged=True) == []
 
 
 def test_repeated_samples_are_counted(cases: Cases) -> None:
