@@ -191,7 +191,9 @@ def findings(
     # A value that is only stated has no noise.
     read = {name for name in white if np.ptp(record.signals[name]) > 0.0}
     noise = {name: beside_rounding(level, steps.get(name, 0.0)) for name, level in white.items()}
-    ratios = {name: noise[name] / planned[name] for name in noise if name in read & planned.keys() and noise[name]}
+    ratios = {
+        name: noise[name] / planned[name] for name in noise if name in read & planned.keys() and noise[name]
+    }
     usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, LEAST_SCALE)
     result = []
     coarse = coarsest(record, rounded) | stated_steps(record)

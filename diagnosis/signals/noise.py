@@ -13,7 +13,10 @@ ROUNDING = 4.0 * float(np.finfo(np.float64).eps)  # of a value, relative to the 
 COARSE = 1e3  # roundings that a step must exceed
 # Levels from which on they tell of a step: the two gaps between three free floats have no common divisor.
 LEVELS = 3
-# Share of levels that must be multiples of a step, and how many times too large their first guess may be.
+SELDOM = (
+    0.2  # of how often the commonest level occurs, up to which one may have come about between two others
+)
+# Share of equal samples that must be multiples of a step, and how many times too large its first guess may be.
 MOST, TIMES = 0.8, 12
 ALIGNED = 1e-6  # of a step, within which a value counts as a multiple: far more than the rounding of floats
 
@@ -52,13 +55,14 @@ def quantum_between(x: Array) -> float:
     """
     checked(signal=x)
     levels, counts = np.unique(x[1:][np.diff(x) == 0.0], return_counts=True)
-    sure = levels[counts > 1] if np.count_nonzero(counts > 1) >= LEVELS else levels
+    often = counts > max(1.0, SELDOM * np.max(counts, initial=0.0))
+    sure = levels[often] if np.count_nonzero(often) >= LEVELS else levels
     coarse = quantum(sure) if sure.size >= LEVELS else 0.0
     if coarse == 0.0:
         return 0.0
     for part in range(1, TIMES + 1):
         places = (levels - sure[0]) / (coarse / part)
-        if np.mean(np.abs(places - np.round(places)) < ALIGNED) >= MOST:
+        if np.average(np.abs(places - np.round(places)) < ALIGNED, weights=counts) >= MOST:
             return coarse / part
     return 0.0
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from common.errors import InputError
 from diagnosis.fits import residuals
-from diagnosis.signals.noise import quantum
+from diagnosis.signals.noise import quantum, quantum_between
 from models.registry import Array
 
 
@@ -41,6 +41,28 @@ def test_the_quantum_is_found_although_levels_are_missing() -> None:
     assert quantum(np.array([1.0, 1.0, 4.0])) == pytest.approx(3.0)
     assert quantum(np.sin(np.arange(5000) * 0.01)) == 0.0
     assert quantum(np.concatenate([np.zeros(900), np.random.default_rng(0).random(100)])) == 0.0
+
+
+@given(
+    step=st.floats(1e-9, 1e3),
+    rate=st.floats(700.0, 1500.0),
+    amplitude=st.floats(2.0, 300.0),
+    seed=st.integers(0, 99),
+)
+def test_the_quantum_of_readings_that_were_interpolated_after_rounding_is_found(
+    step: float, rate: float, amplitude: float, seed: int
+) -> None:
+    times, ticks = np.arange(0.0, 12.0, 1.0 / rate), np.arange(0.0, 11.9, 0.002)
+    noise = np.random.default_rng(seed).normal(0.0, 0.2, times.size)
+    levels = step * np.round(amplitude * np.sin(2.0 * np.pi * 0.7 * times) + noise)
+    assert quantum_between(np.interp(ticks, times, levels)) == pytest.approx(step, rel=1e-6)
+
+
+def test_repeated_readings_that_were_never_rounded_have_no_quantum() -> None:
+    values = np.random.default_rng(1).normal(size=4000)
+    values[7::20] = values[6::20]
+    assert quantum_between(values) == 0.0
+    assert quantum_between(np.full(4000, 2.0)) == 0.0
 
 
 def heavy(seed: int, *shape: int) -> Array:

@@ -118,3 +118,25 @@ def test_an_interpolated_channel_does_not_count_as_one_that_misses_samples(cases
     between = ImportedData("a.csv", False, {MASTER: {"column_force": ImportedChannel(interpolated=True)}})
     logged = replace(held, run=replace(held.run, metadata=held.run.metadata | {IMPORT: between.metadata()}))
     assert readings.held(logged, {}) == {}
+
+
+def test_steps_from_before_an_interpolation_are_the_loggers(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    ticks, rate = whole.time, 1024.0
+    times = np.arange(0.0, ticks[-1] + 1.0 / rate, 1.0 / rate)
+    force = np.round(np.interp(times, ticks, whole.signals["damper_force"]))
+    between = np.interp(ticks, times, force)
+    logged = replace(whole, signals=whole.signals | {"damper_force": between})
+    assert readings.steps(logged) == {}
+    steps = readings.resolutions(logged, {})
+    assert steps == {"damper_force": pytest.approx(1.0)}
+    assert readings.held(logged, steps) == {}
+    assert readings.floors({"damper_force": 0.1}, steps)["damper_force"] == pytest.approx(1.0 / np.sqrt(12.0))
+    levels = readings.levels([residuals.prepare(kind(logged), logged, steps) for kind in (lab_a, lab_b)])
+    assert readings.findings(logged, levels, {}, steps) == []
+
+
+def test_noise_is_found_beside_steps_that_it_hides(cases: Cases) -> None:
+    effects = {"sensor.damper_force.noise": {"rms": 0.8}, "sensor.damper_force.quantization": {"step": 0.2}}
+    whole = cases.record(effects, duration=8.0)
+    assert "sensor.damper_force.noise" in [item.effect for item in found_in(whole)]

@@ -12,6 +12,7 @@ import pytest
 from common.recording.imported import ImportedData, LoggerFilter, imported
 from common.recording.reader import read
 from common.recording.run import Run
+from diagnosis.recorded import slips
 from report.text.tabular import read_table
 from report.text.text_form import StatedForm, TextForm
 
@@ -202,6 +203,15 @@ def test_a_mistaken_unit_or_sign_is_refused_in_one_sentence(bring: Any, capsys: 
     assert error.count("\n") == 1
     assert message in error
     assert bring(text, rows, 'time = "t"\n', "--as-is")[0] == 0
+
+
+def test_a_motion_against_its_prediction_is_no_wrong_sign_where_its_shape_differs() -> None:
+    ticks = np.arange(4000) * 0.002
+    predicted = np.sin(2.0 * np.pi * ticks)
+    for phase, wrong in ((150.0, False), (160.0, True)):
+        measured = np.sin(2.0 * np.pi * ticks - np.radians(phase))
+        factor = slips.compared(measured, predicted, 0.0, 0)
+        assert (factor is not None and factor < 0.0) == wrong
 
 
 def test_a_force_without_a_command_is_checked_against_the_measured_deformation(
