@@ -13,7 +13,7 @@ from common.errors import InputError
 from common.plan.kinds import COLUMN
 from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import logger, readings, report, where
+from diagnosis.findings import logger, readings, report, staircases, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in
 from diagnosis.fits import residuals
@@ -116,10 +116,11 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     searches = [item.search for item in verdicts]
     final, held = [item.data for item in searches], readings.held(record, steps)
     noises = readings.levels(final, list(map(heard, searches)))
+    sensors = readings.findings(record, noises, rounded, steps, logged=late is not None)
     result = Diagnosis(
         record,
         verdicts,
-        readings.findings(record, noises, rounded, steps, logged=late is not None),
+        staircases.told(sensors, searches, record),
         exchanged(record),
         {} if late is not None else held,  # a logger's steps repeat samples too
         readings.floors(noises, steps),

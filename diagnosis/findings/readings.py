@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.fits.residuals import Data
+from diagnosis.fits.residuals import STEPPING, Data
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import quantum, quantum_between
@@ -148,8 +148,8 @@ def floors(noise: Mapping[str, float], steps: Mapping[str, float]) -> dict[str, 
 
 
 def beside_rounding(white: float, step: float) -> float:
-    """Rms noise of a reading without that of its rounding to a step; 0 where the step hides it."""
-    return math.sqrt(white**2 - step**2 / 12.0) if white > step else 0.0
+    """Rms noise of a reading without that of its rounding to a step; 0 where the step may hide it."""
+    return math.sqrt(white**2 - step**2 / 12.0) if STEPPING * white > step else 0.0
 
 
 def coarsest(record: Record, rounded: dict[str, float]) -> dict[str, float]:

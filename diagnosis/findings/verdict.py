@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.findings.sites.likely import APART, ranked
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.hypothesis import TOLERANCES
+from diagnosis.fits.hypothesis import TOLERANCES, Problem
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, exchanged_pair
 from diagnosis.fits.trade import tied
@@ -47,6 +47,7 @@ NEARLY = 0.99
 FALSE = 0.06
 # Distance from the bound, in tolerances, within which a nominal parameter counts as pinned to it.
 PINNED = 1e-3
+END = 1e-6  # of its range, within which an effect's parameter counts as at its end
 
 
 @dataclass(frozen=True)
@@ -194,10 +195,10 @@ def how_well(search: Search) -> Outcome:
     """Explained if the rest is noise and no nominal parameter is too far off; otherwise partly explained or unknown.
 
     An effect that only imitates the true one leaves a systematic residual, however much of the gap it closes, or the
-    nominal parameters have to give way.
+    nominal parameters have to give way, or it would be larger than it can be.
     """
     fit = search.chosen
-    strained = bool(pinned(fit)) or farthest(fit) < HALF
+    strained = bool(pinned(fit)) or farthest(fit) < HALF or bool(at_end(fit))
     if not (strained or leaves(fit, allowed(search)) or unproven(search)):
         return "explained"
     return "partly" if search.explained > HALF else "unknown"
@@ -276,6 +277,20 @@ def pinned(fit: Fit) -> tuple[str, ...]:
     """Nominal parameters that a fit leaves at the bound of their range."""
     far = np.abs(fit.z) > TOLERANCES - PINNED
     return tuple(item.name for item, yes in zip(fit.data.part.nuisances, far, strict=True) if yes)
+
+
+def at_end(fit: Fit) -> tuple[str, ...]:
+    """Effects of a fit of which a parameter that is no shape lies at the end of what is believed of it."""
+    problem = Problem(fit.data, fit.values)
+    low, high = problem.bounds()
+    places = problem.place(fit.values, fit.z)
+    edge = END * (high - low)
+    far = (places <= low + edge) | (places >= high - edge)
+    return tuple(
+        item.effect
+        for item, yes in zip(problem.frees, far[fit.z.size :], strict=True)
+        if yes and not item.parameter.shape
+    )
 
 
 def certainty(search: Search) -> float:

@@ -1,0 +1,77 @@
+"""Steps of a sensor are told from its noise although noise was added to them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from diagnosis.findings import readings, staircases
+from diagnosis.findings.staircases import staircase
+from diagnosis.fits import residuals
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import search
+from diagnosis.recorded.record import Record
+from models.registry import Array
+from tests.diagnosis.cases import Cases, lab_b
+
+
+def motion(amplitude: float) -> Array:
+    t = np.arange(6000) * 0.002
+    return amplitude * (np.sin(2.0 * np.pi * 0.9 * t) + 0.5 * np.sin(2.0 * np.pi * 2.3 * t + 1.0))
+
+
+@given(
+    step=st.floats(1e-7, 1e2),
+    levels=st.floats(2.0, 60.0),
+    noise=st.floats(0.0, 0.15),
+    seed=st.integers(0, 99),
+)
+def test_steps_below_noise_are_found_with_their_size(
+    step: float, levels: float, noise: float, seed: int
+) -> None:
+    predicted = motion(levels * step)
+    read = step * np.round(predicted / step) + np.random.default_rng(seed).normal(
+        0.0, noise * step, predicted.size
+    )
+    found = staircase(predicted, read - predicted)
+    assert found is not None
+    assert found.step == pytest.approx(step, rel=2e-3)
+    assert found.low <= step <= found.high
+
+
+@given(levels=st.floats(2.0, 60.0), seed=st.integers(0, 99))
+def test_noise_is_no_staircase(levels: float, seed: int) -> None:
+    predicted = motion(levels)
+    assert staircase(predicted, np.random.default_rng(seed).normal(0.0, 0.3, predicted.size)) is None
+    assert staircase(0.0 * predicted, 0.0 * predicted) is None
+
+
+@pytest.mark.parametrize("fault", ["noise", "quantization"])
+def test_the_fault_of_a_sensor_is_told_behind_a_loggers_noise(cases: Cases, fault: str) -> None:
+    rms = 2e-4
+    whole = cases.record(duration=8.0)
+    name, generator = "table_displacement", np.random.default_rng(3)
+    true = whole.signals[name]
+    step = np.sqrt(12.0) * rms
+    values = (
+        step * np.round(true / step)
+        if fault == "quantization"
+        else true + generator.normal(0.0, rms, true.size)
+    )
+    values = values + generator.normal(0.0, 1e-6, true.size)
+    logged = replace(whole, signals=whole.signals | {name: values})
+    found = told(logged)
+    assert [item.effect for item in found] == [f"sensor.{name}.{fault}"]
+    assert found[0].value == pytest.approx(step if fault == "quantization" else rms, rel=0.05)
+
+
+def told(record: Record) -> list[readings.SensorFinding]:
+    """Findings on the sensors of the slave's laboratory."""
+    data = residuals.prepare(lab_b(record), record, {})
+    searched = search(data, Scales(record, 0.0))
+    found = readings.findings(record, readings.levels([searched.data]), {}, {})
+    return staircases.told(found, [searched], record)
