@@ -15,7 +15,7 @@ from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import logger, readings, report, staircases, where
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in
+from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
@@ -115,15 +115,18 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
             late = found.data.part.late(found.chosen.z)
     searches = [item.search for item in verdicts]
     final, held = [item.data for item in searches], readings.held(record, steps)
-    noises = readings.levels(final, list(map(heard, searches)))
-    sensors = readings.findings(record, noises, rounded, steps, logged=late is not None)
+    loud, sharp = (readings.levels(final, list(map(of, searches))) for of in (heard, sharpest))
+    noisy, named = (
+        readings.findings(record, levels, rounded, steps, logged=late is not None) for levels in (loud, sharp)
+    )
+    sensors = staircases.told(named, noisy, searches, record)
     result = Diagnosis(
         record,
         verdicts,
-        staircases.told(sensors, searches, record),
+        sensors,
         exchanged(record),
         {} if late is not None else held,  # a logger's steps repeat samples too
-        readings.floors(noises, steps),
+        readings.floors(loud, steps, sensors, record),
         [
             *together(more),
             *of_plan(record),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -142,9 +142,16 @@ def levels(datas: list[Data], noises: list[Array] | None = None) -> dict[str, fl
     }
 
 
-def floors(noise: Mapping[str, float], steps: Mapping[str, float]) -> dict[str, float]:
-    """Rms noise of every reading, no less than what rounding to its step makes."""
-    return {name: max(level, steps.get(name, 0.0) / math.sqrt(12.0)) for name, level in noise.items()}
+def floors(
+    noise: Mapping[str, float], steps: Mapping[str, float], named: Sequence[SensorFinding], record: Record
+) -> dict[str, float]:
+    """Rms noise of every reading, no less than what rounding makes; steps of effects `named` are simulated instead."""
+    own = {item.effect for item in named}
+    result = dict(noise)
+    for name in noise.keys() & steps.keys():
+        if effect_on(record, name, "quantization") not in own:
+            result[name] = max(noise[name], steps[name] / math.sqrt(12.0))
+    return result
 
 
 def beside_rounding(white: float, step: float) -> float:

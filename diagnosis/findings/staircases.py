@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.findings.readings import SensorFinding, effect_on
+from diagnosis.findings import readings
 from diagnosis.fits import hypothesis
 from diagnosis.fits.search import Search
 from diagnosis.recorded.record import Record
@@ -33,34 +33,41 @@ class Stairs:
     high: float
 
 
-def told(found: Sequence[SensorFinding], searches: Sequence[Search], record: Record) -> list[SensorFinding]:
-    """The findings on sensors, with steps in the place of noise that follows from steps of the prediction."""
-    result = list(found)
+def told(
+    named: Sequence[readings.SensorFinding],
+    noisy: Sequence[readings.SensorFinding],
+    searches: Sequence[Search],
+    record: Record,
+) -> list[readings.SensorFinding]:
+    """The findings `named`, with steps in the place of noise that follows from steps of the prediction.
+
+    `noisy` are findings of noise of any colour, which what no effect explains may be as well.
+    """
+    noises = {item.effect: item for item in (*named, *noisy) if item.effect.endswith(".noise")}
+    steps = {}
     for search in searches:
-        fit, part = search.chosen, search.data.part
-        predicted = residual = None
-        for place, name in enumerate(part.signals):
-            noisy = [item for item in result if item.effect == effect_of(record, name, "noise")]
-            if not noisy:
-                continue
-            if predicted is None or residual is None:
-                system = hypothesis.lay(search.data, fit.z, fit.values)
-                predicted, residual = part.predict(system), search.data.residual(system)
+        rows = [
+            (
+                place,
+                readings.effect_on(record, name, "noise"),
+                readings.effect_on(record, name, "quantization"),
+            )
+            for place, name in enumerate(search.data.part.signals)
+            if name in readings.read_by(record)
+        ]
+        rows = [row for row in rows if row[1] in noises]
+        if not rows:
+            continue
+        system = hypothesis.lay(search.data, search.chosen.z, search.chosen.values)
+        predicted, residual = search.data.part.predict(system), search.data.residual(system)
+        for place, noise, quantization in rows:
             there = search.data.there[:, place] & np.isfinite(predicted[:, place])
-            stairs = staircase(predicted[there, place], residual[there, place])
-            if stairs is not None:
-                effect = effect_on(record, name, "quantization")
+            if stairs := staircase(predicted[there, place], residual[there, place]):
                 bounds = (stairs.low, stairs.high)
-                result[result.index(noisy[0])] = SensorFinding(
-                    effect, "step", stairs.step, bounds, noisy[0].ratio
-                )
-    return result
-
-
-def effect_of(record: Record, name: str, fault: str) -> str:
-    """The effect of a fault on a reading, empty where no laboratory measures it."""
-    measured = any(name in lab.measured for lab in record.labs)
-    return effect_on(record, name, fault) if measured else ""
+                ratio = noises[noise].ratio
+                steps[noise] = readings.SensorFinding(quantization, "step", stairs.step, bounds, ratio)
+    kept = [item for item in named if item.effect not in steps]
+    return [*kept, *steps.values()]
 
 
 def staircase(predicted: Array, residual: Array) -> Stairs | None:

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from diagnosis.fits import contact, fitting
-from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.fitting import Fit, everywhere, excess
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import in_best_laws
 from diagnosis.fits.laws.unlike_first import unlike_first
@@ -58,11 +58,11 @@ def extended(fit: Fit, scales: Scales, count: int = FITTED, known: Fit | None = 
         return fitting.fit(data, better.values, better.z, LAST, rounds=1)
 
     with ThreadPoolExecutor(WORKERS) as pool:
-        fits = sorted(pool.map(rough, promising), key=lambda item: item.cost)
-        least = min((excess(item) for item in fits), default=0.0)
+        fits = sorted(pool.map(rough, promising), key=everywhere)
+        least = min((everywhere(item) for item in fits), default=0.0)
         if known is not None:
-            least = min(least, max(excess(known), TIED))
-        hopeful = [item for item in fits if excess(item) <= HOPELESS * least][:FINE]
+            least = min(least, max(everywhere(known), TIED))
+        hopeful = [item for item in fits if everywhere(item) <= HOPELESS * least][:FINE]
         hopeful = fits if data.part.exact else hopeful
         rest = [fitting.at(data, item.values, item.z) for item in fits[len(hopeful) :]]
         fits = sorted([*pool.map(fine, hopeful), *rest], key=lambda item: item.cost)

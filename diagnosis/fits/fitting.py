@@ -128,6 +128,15 @@ def moved(data: Data, fit: Fit, steps: int, slopes: Array | None, weights: Array
     return Fit(data, problem.values(p), p[: problem.count], problem.reduced(p))
 
 
+def everywhere(fit: Fit) -> float:
+    """What a fit costs with the groups that it has seen, beyond noise.
+
+    Fits that have not reached their end are ranked by it: an effect may show in few seconds, all of which they see,
+    and until they have found its size they may be worse on the others.
+    """
+    return max(0.0, float(np.sum(np.square(fit.reduced))) - fit.reduced.size) + fit.prior
+
+
 def at(data: Data, values: Values, z: Array) -> Fit:
     """A hypothesis at given parameters, nothing fitted."""
     return Fit(data, values, z, data.reduced(lay(data, z, values)))

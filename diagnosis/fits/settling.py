@@ -185,7 +185,7 @@ def as_near(bare: Fit, fit: Fit) -> Fit:
     A fit under white noise may take slow noise for a delay, which a few steps under coloured noise do not undo.
     """
     other = again(fitting.at(bare.data, {}, fit.z), bare.data)
-    return min(bare, other, key=lambda item: float(np.sum(item.reduced**2)) + item.prior)
+    return min(bare, other, key=fitting.everywhere)
 
 
 def in_white_noise(bare: Fit, scales: Scales) -> list[Fit]:

@@ -131,7 +131,8 @@ def test_steps_from_before_an_interpolation_are_the_loggers(cases: Cases) -> Non
     steps = readings.resolutions(logged, {})
     assert steps == {"damper_force": pytest.approx(1.0)}
     assert readings.held(logged, steps) == {}
-    assert readings.floors({"damper_force": 0.1}, steps)["damper_force"] == pytest.approx(1.0 / np.sqrt(12.0))
+    floors = readings.floors({"damper_force": 0.1}, steps, [], logged)
+    assert floors["damper_force"] == pytest.approx(1.0 / np.sqrt(12.0))
     levels = readings.levels([residuals.prepare(kind(logged), logged, steps) for kind in (lab_a, lab_b)])
     assert readings.findings(logged, levels, {}, steps) == []
 

@@ -230,3 +230,12 @@ def test_a_far_likelier_exchange_of_one_effect_stands_in_front(cases: Cases) -> 
     assert likeliest(known) is known
     more = replace(known, chosen=wrong, alternatives=(fitting.at(data, true.values | wrong.values, true.z),))
     assert likeliest(more) is more
+
+
+def test_an_effect_is_found_that_shows_most_in_the_seconds_that_a_fit_sees(cases: Cases) -> None:
+    effects = {"sensor.damper_force.saturation": {"limit": 55.0, "sharpness": 6.0}}
+    whole = cases.record(effects, duration=8.0)
+    data = residuals.prepare(lab_b(whole), whole)
+    found = search(replace(data, train=~data.train), Scales(whole, 0.0))  # the peak is seen
+    assert found.chosen.names == tuple(effects)
+    assert found.chosen.values["sensor.damper_force.saturation"]["limit"] == pytest.approx(55.0, rel=1e-3)

@@ -74,4 +74,4 @@ def told(record: Record) -> list[readings.SensorFinding]:
     data = residuals.prepare(lab_b(record), record, {})
     searched = search(data, Scales(record, 0.0))
     found = readings.findings(record, readings.levels([searched.data]), {}, {})
-    return staircases.told(found, [searched], record)
+    return staircases.told(found, [], [searched], record)
