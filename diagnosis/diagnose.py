@@ -13,8 +13,9 @@ from common.errors import InputError
 from common.plan.kinds import COLUMN
 from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import logger, readings, report, staircases, where
+from diagnosis.findings import logger, report, where
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.sensors import readings, staircases
 from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data

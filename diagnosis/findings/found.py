@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from common.plan.plan import Plan
-from diagnosis.findings.readings import SensorFinding
+from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.hypothesis import Values
 from diagnosis.learned.learn import LearnedLaw, Of

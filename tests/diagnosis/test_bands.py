@@ -14,9 +14,9 @@ from common.plan.plan import Plan
 from common.reality import reality
 from common.reality.reality import Reality
 from common.recording.reader import read
-from diagnosis.findings import readings
 from diagnosis.findings.for_prediction.as_reality import as_reality
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.sensors import readings
 from diagnosis.findings.verdict import heard, judge
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.search import Search

@@ -10,8 +10,8 @@ import pytest
 from common.recording.imported import IMPORT, ImportedChannel, ImportedData
 from common.recording.reader import read
 from common.roles import MASTER
-from diagnosis.findings import readings
-from diagnosis.findings.readings import SensorFinding
+from diagnosis.findings.sensors import readings
+from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.fits import residuals
 from diagnosis.recorded import record
 from diagnosis.recorded.record import Record

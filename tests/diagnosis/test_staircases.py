@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis.findings import readings, staircases
-from diagnosis.findings.staircases import staircase
+from diagnosis.findings.sensors import readings, staircases
+from diagnosis.findings.sensors.staircases import staircase
 from diagnosis.fits import residuals
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search

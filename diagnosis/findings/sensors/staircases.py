@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.findings import readings
+from diagnosis.findings.sensors import readings
 from diagnosis.fits import hypothesis
 from diagnosis.fits.search import Search
 from diagnosis.recorded.record import Record

@@ -1,0 +1,1 @@
+"""What readings show of their sensors by themselves: noise, steps, and samples that are missed."""
