@@ -48,28 +48,30 @@ PRESLIDING = 19  # m, of the rail's friction
 BEHIND, GUIDE, DAMPED, SOFT = 20, 21, 22, 23
 STOP_EXPONENT, STOP_DAMPING = 24, 25
 
-# places in `scratch` behind the states and inputs
+# places in `state` behind the states and inputs
 PLAYED, LAST_VELOCITY, BRISTLES = range(3)
 MEMORIES = 3
-# Of Newton's method: its error is below a millionth of the friction as long as that stops the mass, within a segment,
-# over no more than a thousand times the presliding; 200 N on 16 kg do so over 0.8 µm.
-CLIMBS = 7
-ARRIVED = 1e-8  # of the distance: the next step would be its square, below what a number holds
+ROWS = 8  # of a column: as many with an oil column as without one, so that they are carried side by side
+# Of Halley's method: four of them leave an error of rounding as long as friction stops the mass, within a segment, over
+# no more than a thousand times the presliding; 200 N on 16 kg do so over 0.8 µm.
+CLIMBS = 5
+ARRIVED = 1e-5  # of the distance: the next step would be its cube, below what a number holds
 
 
 class TableLab(NamedTuple):
     """The state and constants of the laboratory, which `advance` updates by one interval."""
 
     taps: Array  # of the delayed command
-    # (m, n, n + 5): next state from state, command before and after, motor command, g, table friction
-    matrices: Array
+    # (m, n + 5, ROWS): what state, command before and after, motor command, g and table friction add to the next state
+    columns: Array
     lengths: Array  # of the segments, s
     spring: Array  # (stiffness N/m, dashpot N·s/m) of the damper
     limits: Array  # effects that are not in the matrices
     history: Array  # table commands written, newest first
-    state: Array  # (n,), n = 6, or 8 with an oil column
-    # (n + 8,): behind the inputs the command after the play, an ideal table's last velocity, the bristles' force
-    scratch: Array
+    # (n + 8,), n = 6, or 8 with an oil column: behind the states the inputs, the command after the play, an ideal
+    # table's last velocity, and the bristles' force
+    state: Array
+    free: Array  # (ROWS,): the states at a segment's end without g and the table's friction
     learned: Array  # a law of `models.preisach` of the stroke, empty for none
     learned_memory: Array
     braked: Array  # a law of the table's motion, m/s², empty for none
@@ -102,8 +104,10 @@ def build(
     for length in segments.lengths:
         if (key := round(float(length), 12)) not in alike:
             alike[key] = propagation(float(length), table, damper, on_table)
-    matrices = np.stack([alike[round(float(length), 12)] for length in segments.lengths])
-    size = matrices.shape[1]
+    rows = np.stack([alike[round(float(length), 12)] for length in segments.lengths])
+    size = rows.shape[1]
+    columns = np.zeros((len(rows), size + INPUTS, ROWS))
+    columns[:, :, :size] = rows.transpose(0, 2, 1)
     before, behind = plays(on_table)
     limits = [float(present), on_table.gain, before, on_table.friction, on_damper.gain]
     limits += [on_damper.force_limit, on_damper.friction, on_damper.stop_stroke, on_damper.stop_stiffness]
@@ -114,13 +118,13 @@ def build(
     limits += [on_damper.presliding, *behind, on_damper.stop_exponent, on_damper.stop_damping]
     return TableLab(
         segments.taps,
-        matrices,
+        columns,
         segments.lengths,
         np.array([damper.stiffness, damper.damping]),
         np.array(limits),
         np.zeros(segments.memory),
-        np.zeros(size),
         np.zeros(size + INPUTS + MEMORIES),
+        np.zeros(ROWS),
         law,
         preisach.memory(law),
         braked,
@@ -148,66 +152,88 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
 
     The table's command is ramped to `command` (m) until then, the motor's (N) is held.
     """
-    taps, matrices, spring, limits = lab.taps, lab.matrices, lab.spring, lab.limits
-    history, state, scratch = lab.history, lab.state, lab.scratch
-    size = state.size
+    taps, columns, spring, limits = lab.taps, lab.columns, lab.spring, lab.limits
+    history, state, free = lab.history, lab.state, lab.free
+    size = columns.shape[1] - INPUTS
     before, after, motor, rail, drag = size, size + 1, size + 2, size + 3, size + 4
     played, last = size + INPUTS + PLAYED, size + INPUTS + LAST_VELOCITY
     start = state[TABLE]
     present, apart = limits[PRESENT] != 0.0, 0.0
-    scratch[motor] = motor_command
-    scratch[rail] = 0.0
-    scratch[drag] = 0.0
+    state[motor] = motor_command
+    state[rail] = 0.0
+    state[drag] = 0.0
     if present:
         most = limits[FORCE_LIMIT]
-        scratch[motor] = min(max(limits[MOTOR_GAIN] * motor_command, -most), most)
+        state[motor] = min(max(limits[MOTOR_GAIN] * motor_command, -most), most)
         command *= limits[TABLE_GAIN]
     delay.remember(history, command)
-    scratch[after] = delay.delayed(history, taps, 0)
+    state[after] = delay.delayed(history, taps, 0)
     if limits[PLAY] > 0.0:
-        scratch[after] = scratch[played]
-    for i in range(matrices.shape[0]):
-        for row in range(size):
-            scratch[row] = state[row]
-        scratch[before] = scratch[after]
-        scratch[after] = delay.delayed(history, taps, i + 1)
+        state[after] = state[played]
+    for i in range(columns.shape[0]):
+        state[before] = state[after]
+        state[after] = delay.delayed(history, taps, i + 1)
         if present:
             half = 0.5 * limits[PLAY]
             if half > 0.0:
-                wanted = scratch[after]
-                scratch[played] = min(max(scratch[played], wanted - half), wanted + half)
-                scratch[after] = scratch[played]
-            resist(matrices[i], lab, scratch, lab.lengths[i])
-            apart = within_play(matrices[i], limits, scratch, lab.lengths[i])
-            scratch[TABLE] += apart  # the platform as it would be on its spring without play
+                wanted = state[after]
+                state[played] = min(max(state[played], wanted - half), wanted + half)
+                state[after] = state[played]
+        carry(columns[i], state, free)
+        if present:
+            resist(columns[i], lab, lab.lengths[i])
+            if limits[BEHIND] > 0.0:
+                apart = within_play(columns[i], limits, state, free, lab.lengths[i])
+                state[TABLE] += apart  # the platform as it would be on its spring without play
+                carry(columns[i], state, free)
         for row in range(size):
-            value = 0.0
-            for column in range(size + INPUTS):
-                value += matrices[i, row, column] * scratch[column]
-            state[row] = value
+            state[row] = with_forces(columns[i], state, free, row)
         put_back(limits, state, apart)
     if limits[IDEAL] > 0.0:  # its velocity has steps, so the acceleration is the mean over the interval
         velocity = (state[TABLE] - start) / limits[IDEAL]
-        state[ACCELERATION] = (velocity - scratch[last]) / limits[IDEAL]
-        scratch[last] = velocity
-    force = spring[0] * state[STROKE] + spring[1] * state[STROKE_RATE] + scratch[rail] - state[MOTOR]
+        state[ACCELERATION] = (velocity - state[last]) / limits[IDEAL]
+        state[last] = velocity
+    force = spring[0] * state[STROKE] + spring[1] * state[STROKE_RATE] + state[rail] - state[MOTOR]
     return state[TABLE], state[ACCELERATION], state[STROKE], force
 
 
 @jit
-def within_play(matrix: Array, limits: Array, scratch: Array, length: float) -> float:
+def carry(columns: Array, state: Array, free: Array) -> None:
+    """Compute the states at a segment's end without g and the table's friction, the rows side by side."""
+    a = b = c = d = e = f = g = h = 0.0
+    for column in range(columns.shape[0] - 2):
+        value = state[column]
+        a += columns[column, 0] * value
+        b += columns[column, 1] * value
+        c += columns[column, 2] * value
+        d += columns[column, 3] * value
+        e += columns[column, 4] * value
+        f += columns[column, 5] * value
+        g += columns[column, 6] * value
+        h += columns[column, 7] * value
+    free[0], free[1], free[2], free[3] = a, b, c, d
+    free[4], free[5], free[6], free[7] = e, f, g, h
+
+
+@jit
+def with_forces(columns: Array, state: Array, free: Array, row: int) -> float:
+    """A state at a segment's end with g and the table's friction as they are among the inputs."""
+    rail, drag = columns.shape[0] - 2, columns.shape[0] - 1
+    return float(free[row] + columns[rail, row] * state[rail] + columns[drag, row] * state[drag])
+
+
+@jit
+def within_play(columns: Array, limits: Array, state: Array, free: Array, length: float) -> float:
     """How far (m) the loop is ahead of the platform when their spring is at rest, at the middle of a segment.
 
     In contact it is half the play. Within the play it is such that the spring and its damping together leave the drag
     of the guide.
     """
     half, guide = limits[BEHIND], limits[GUIDE]
-    if half == 0.0:
-        return 0.0
-    speed = scratch[BASE_RATE] - scratch[TABLE_RATE]
-    end = free_rate(matrix, scratch, BASE_RATE) - scratch[TABLE_RATE] - guide * length * speed
+    speed = state[BASE_RATE] - state[TABLE_RATE]
+    end = with_forces(columns, state, free, BASE_RATE) - state[TABLE_RATE] - guide * length * speed
     middle = 0.5 * (speed + end)
-    ahead = scratch[BASE] - scratch[TABLE] + 0.25 * length * (speed + middle)
+    ahead = state[BASE] - state[TABLE] + 0.25 * length * (speed + middle)
     if abs(ahead) > half:
         return half if ahead > 0.0 else -half
     return float(ahead + (limits[DAMPED] - limits[SOFT] * guide) * middle)
@@ -227,44 +253,44 @@ def put_back(limits: Array, state: Array, apart: float) -> None:
 
 
 @jit
-def resist(matrix: Array, lab: TableLab, scratch: Array, length: float) -> None:
-    """Compute a segment's forces beyond the matrices.
+def resist(columns: Array, lab: TableLab, length: float) -> None:
+    """Compute a segment's forces beyond the matrices, whose states at its end `carry` has found.
 
     Of the table's friction and law, and of the damper's stop, law and friction.
     """
-    limits, size = lab.limits, matrix.shape[0]
+    limits, state, size = lab.limits, lab.state, columns.shape[0] - INPUTS
     rail, drag = size + 3, size + 4
-    scratch[rail] = -limits[OFFSET]
-    scratch[drag] = 0.0
-    middle = scratch[STROKE] + 0.5 * matrix[STROKE, STROKE_RATE] * scratch[STROKE_RATE]
+    state[rail] = -limits[OFFSET]
+    state[drag] = 0.0
+    middle = state[STROKE] + 0.5 * columns[STROKE_RATE, STROKE] * state[STROKE_RATE]
     if abs(middle) > limits[STOP]:  # at the segment's middle, with which a bounce conserves energy
-        scratch[rail] += stops.force(
+        state[rail] += stops.force(
             middle,
-            scratch[STROKE_RATE],
+            state[STROKE_RATE],
             limits[STOP],
             limits[STOP_STIFFNESS],
             limits[STOP_EXPONENT],
             limits[STOP_DAMPING],
         )
     if lab.learned.size > 0:
-        scratch[rail] += preisach.step(lab.learned, lab.learned_memory, middle, scratch[STROKE_RATE])
+        state[rail] += preisach.step(lab.learned, lab.learned_memory, middle, state[STROKE_RATE])
     base = BASE_RATE if size > BASE else TABLE_RATE
     if lab.braked.size > 0:
-        place = scratch[base - 1] + 0.5 * matrix[base - 1, base] * scratch[base]
-        scratch[drag] -= preisach.step(lab.braked, lab.braked_memory, place, scratch[base])
+        place = state[base - 1] + 0.5 * columns[base, base - 1] * state[base]
+        state[drag] -= preisach.step(lab.braked, lab.braked_memory, place, state[base])
     if limits[TABLE_FRICTION] > 0.0:
-        most = limits[TABLE_FRICTION] * rubbing(limits, TABLE_SHAPE, scratch[base], limits[TABLE_VELOCITY])
+        most = limits[TABLE_FRICTION] * rubbing(limits, TABLE_SHAPE, state[base], limits[TABLE_VELOCITY])
         side = limits[TABLE_SHAPE]
-        scratch[drag] += stopping(matrix, scratch, base, drag, -most * (1.0 + side), most * (1.0 - side))
+        state[drag] += stopping(columns, lab, base, drag, -most * (1.0 + side), most * (1.0 - side))
     if limits[FRICTION] > 0.0:
-        most = limits[FRICTION] * rubbing(limits, SHAPE, scratch[STROKE_RATE], limits[VELOCITY])
+        most = limits[FRICTION] * rubbing(limits, SHAPE, state[STROKE_RATE], limits[VELOCITY])
         least, most = -most * (1.0 - limits[SHAPE]), most * (1.0 + limits[SHAPE])
         if limits[PRESLIDING] > 0.0:
             place = size + INPUTS + BRISTLES
-            scratch[place] = bent(matrix, scratch, length, least, most, limits[PRESLIDING])
-            scratch[rail] += scratch[place]
+            state[place] = bent(columns, lab, length, least, most, limits[PRESLIDING])
+            state[rail] += state[place]
         else:
-            scratch[rail] += stopping(matrix, scratch, STROKE_RATE, rail, least, most)
+            state[rail] += stopping(columns, lab, STROKE_RATE, rail, least, most)
 
 
 @jit
@@ -274,39 +300,34 @@ def rubbing(limits: Array, shape: int, rate: float, velocity: float) -> float:
 
 
 @jit
-def stopping(matrix: Array, scratch: Array, rate: int, place: int, least: float, most: float) -> float:
+def stopping(columns: Array, lab: TableLab, rate: int, place: int, least: float, most: float) -> float:
     """The value of input `place` with which state `rate` is zero at the segment's end, limited to a range."""
-    return min(max(-free_rate(matrix, scratch, rate) / matrix[rate, place], least), most)
+    return min(max(-with_forces(columns, lab.state, lab.free, rate) / columns[place, rate], least), most)
 
 
 @jit
-def free_rate(matrix: Array, scratch: Array, rate: int) -> float:
-    """The state `rate` at a segment's end under the present inputs."""
-    free = 0.0
-    for column in range(scratch.size - MEMORIES):
-        free += matrix[rate, column] * scratch[column]
-    return free
-
-
-@jit
-def bent(matrix: Array, scratch: Array, length: float, least: float, most: float, presliding: float) -> float:
+def bent(columns: Array, lab: TableLab, length: float, least: float, most: float, presliding: float) -> float:
     """Force (N) of the rail's bristles at a segment's end, if it has acted over the whole of the segment.
 
     The mass goes on by the velocity at the segment's end, so that stiff bristles stop it and it does not chatter; with
-    ever stiffer ones this becomes `stopping`. The distance is the root of an increasing and concave function, to which
-    Newton's method climbs from below.
+    ever stiffer ones this becomes `stopping`. The distance is the root of an increasing and concave function, which
+    Halley's method seeks from below.
     """
-    size = matrix.shape[0]
-    yields = -matrix[STROKE_RATE, size + 3]
-    force = min(max(scratch[size + INPUTS + BRISTLES], least), most)
-    ahead = length * (free_rate(matrix, scratch, STROKE_RATE) - yields * force)
+    size = columns.shape[0] - INPUTS
+    yields = -columns[size + 3, STROKE_RATE]
+    force = min(max(lab.state[size + INPUTS + BRISTLES], least), most)
+    ahead = length * (with_forces(columns, lab.state, lab.free, STROKE_RATE) - yields * force)
     end = most if ahead > 0.0 else least
     far, lost = abs(ahead), length * yields * abs(end - force)
-    moved = max(far / (1.0 + lost / presliding), far - lost)
+    per = 1.0 / presliding
+    moved = max(far / (1.0 + lost * per), far - lost)
     for _ in range(CLIMBS):
-        left = np.exp(-moved / presliding)
-        step = (far - moved - lost * (1.0 - left)) / (1.0 + lost / presliding * left)
+        left = np.exp(-moved * per)
+        missing = far - moved - lost * (1.0 - left)
+        curved = lost * per * left
+        slope = 1.0 + curved
+        step = 2.0 * missing * slope / (2.0 * slope * slope - missing * curved * per)
         moved += step
-        if abs(step) < ARRIVED * moved:
+        if abs(step) <= ARRIVED * moved:
             break
     return friction.dahl(force, moved if ahead > 0.0 else -moved, least, most, presliding)
