@@ -32,8 +32,13 @@ def laboratory(
     is a constant command (m) before the first tick, whose steady state is the initial one. `anew` (m, 3) holds
     ascending ticks at which the kind's free motion is set to a position (m) and a rate (m/s).
     """
+    return read(kind, system, motion(kind, system, drive, start, anew))
+
+
+def motion(kind: Kind, system: System, drive: Array, start: float = 0.0, anew: Array | None = None) -> Array:
+    """What sensors without error would read, (ticks, channels), as `laboratory`; the same for any sensors."""
     ticks, interval = drive.shape[0], system.plan.test.interval
-    played = silent(kind, system, ticks)
+    played = silent(kind, system.unread, ticks)
     if start != 0.0:
         kind.settle(played.lab, played.truth, start, interval)
     begun = np.zeros((0, 3)) if anew is None else anew
@@ -44,6 +49,17 @@ def laboratory(
         kind.resume(played.lab, played.truth, motion, rate)
         site.play(played, drive, interval, borders[place], borders[place + 1])
     return played.measured
+
+
+def read(kind: Kind, system: System, values: Array) -> Array:
+    """Readings without noise of what sensors without error would read, both (ticks, channels)."""
+    if not system.effects.sensors:
+        return values.copy()
+    interval, result = system.plan.test.interval, np.empty(values.shape)
+    play_readings(
+        readings.build(interval, kind.channels.names, system.effects.sensors), values, interval, result
+    )
+    return result
 
 
 def silent(kind: Kind, system: System, ticks: int) -> Site:
@@ -57,14 +73,15 @@ def column(system: System, deformation: Array) -> Array:
     The forces of the plan's mass and dashpot follow from central differences, because a motion that is linear between
     ticks has no acceleration.
     """
-    force, result = np.empty(deformation.size), np.empty(deformation.size)
+    force, result = np.empty(deformation.size), np.empty((deformation.size, 1))
     interval, effects, column = system.plan.test.interval, system.effects, system.plan.column
     sensors = readings.build(interval, ("column_force",), effects.sensors)
     steps = column_lab.substeps(interval) if specimen.needs_substeps(effects.column) else 1
     parts = specimen.build(replace(column, mass=0.0, damping=0.0), effects.column)
     play_column(parts, deformation, interval, steps, force)
-    play_reading(sensors, specimen.with_rates(column, force, deformation, interval), interval, result)
-    return result
+    whole = specimen.with_rates(column, force, deformation, interval)
+    play_readings(sensors, whole.reshape(-1, 1), interval, result)
+    return result[:, 0]
 
 
 def building(
@@ -96,10 +113,13 @@ def play_column(tested: Specimen, deformation: Array, interval: float, steps: in
 
 
 @jit
-def play_reading(sensors: Readings, values: Array, interval: float, result: Array) -> None:
-    """Fill `result` (ticks,) with the readings of the first sensor for the values (ticks,)."""
-    for tick in range(values.size):
-        result[tick] = readings.step(sensors, 0, values[tick], 0.0, tick * interval)
+def play_readings(sensors: Readings, values: Array, interval: float, result: Array) -> None:
+    """Fill `result` (ticks, channels) with the sensors' readings of the values (ticks, channels)."""
+    for tick in range(values.shape[0]):
+        for channel in range(values.shape[1]):
+            result[tick, channel] = readings.step(
+                sensors, channel, values[tick, channel], 0.0, tick * interval
+            )
 
 
 @jit

@@ -185,6 +185,11 @@ class System:
     plan: Plan
     effects: Effects = field(default_factory=Effects)
 
+    @property
+    def unread(self) -> System:
+        """The system with sensors without error."""
+        return replace(self, effects=replace(self.effects, sensors={})) if self.effects.sensors else self
+
     def scaled(self, table: str, name: str, factor: float) -> System:
         """The system with one parameter of the plan multiplied, in every storey or entry of a matrix.
 

@@ -71,7 +71,8 @@ class Data:
             result = self.part.measured - self.part.predict(system)
         if self.lines is not None:
             result -= self.lines[: len(result)]
-        result[~self.there] = 0.0
+        if self.missing is not None:
+            result[self.missing] = 0.0
         return result
 
     @cached_property
@@ -79,6 +80,11 @@ class Data:
         """Where readings count, (ticks, signals)."""
         present = self.part.present
         return present if self.spikes is None else present & ~self.spikes[: len(present)]
+
+    @cached_property
+    def missing(self) -> Mask | None:
+        """Where no reading counts, (ticks, signals); None where all count."""
+        return None if self.there.all() else ~self.there
 
     @property
     def beside(self) -> Array:
@@ -100,7 +106,10 @@ class Data:
     def averaged(self, raw: Array) -> Array:
         """Means of ticks (ticks, …) over groups (groups, …), scaled so that white noise keeps its rms."""
         count = self.groups * self.group
-        sums = raw[:count].reshape(self.groups, self.group, *raw.shape[1:]).sum(axis=1)
+        ticks = raw[:count].reshape(self.groups, self.group, *raw.shape[1:])
+        sums = ticks[:, 0].copy()
+        for tick in range(1, self.group):  # six times as fast as NumPy's sum over a few values side by side
+            sums += ticks[:, tick]
         return np.asarray(sums / math.sqrt(self.group))
 
     def reduced(self, system: System) -> Array:

@@ -232,3 +232,17 @@ def test_each_storeys_parameters_are_fitted_separately() -> None:
         "structure.stiffness",
         "structure.damping",
     ]
+
+
+@pytest.mark.parametrize("effects", [{}, {"damper.friction": {"force": 150.0}}])
+def test_sensors_read_a_motion_that_is_kept_as_they_read_one_that_is_played(
+    cases: Cases, effects: dict[str, dict[str, float]]
+) -> None:
+    data = data_of(cases, "b")
+    drift = {"sensor.damper_stroke.drift": {"rate": 1e-5}, "sensor.table_acceleration.lag": {"time": 3e-3}}
+    z = np.zeros(len(data.part.nuisances))
+    fitting.at(data, effects, z)  # from here on the motion is kept
+    kept = fitting.at(data, effects | drift, z)
+    played = fitting.at(data_of(cases, "b"), effects | drift, z)
+    assert np.array_equal(kept.reduced, played.reduced)
+    assert not np.array_equal(kept.reduced, fitting.at(data, effects, z).reduced)
