@@ -6,17 +6,16 @@ parameters give way is read off a linear projection; the most promising are then
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 
 from diagnosis.fits import contact, fitting
-from diagnosis.fits.fitting import Fit, everywhere, excess
+from diagnosis.fits.fitting import TIED, Fit, everywhere, excess
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import in_best_laws
 from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.screening import WORKERS, ScreenedEffect, screen
+from diagnosis.fits.screening import ScreenedEffect, screen
+from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import MATERIAL, remaining
 from diagnosis.fits.worth import LOUD
 
@@ -33,7 +32,6 @@ HOPELESS = 30.0  # as long as they leave no more than this times what the best o
 ROUGH = 4  # steps of a first fit
 STEPS = 6  # steps between two weightings of a further fit
 LAST = 5  # steps over the whole test after those over its beginning
-TIED = 9.0  # cost by which hypotheses differ that can be told apart: 3 standard deviations squared
 
 
 def extended(fit: Fit, scales: Scales, count: int = FITTED, known: Fit | None = None) -> list[Fit]:
@@ -57,16 +55,15 @@ def extended(fit: Fit, scales: Scales, count: int = FITTED, known: Fit | None = 
         better = fitting.fit(near.data, item.values, z, STEPS, rounds=2)
         return fitting.fit(data, better.values, better.z, LAST, rounds=1)
 
-    with ThreadPoolExecutor(WORKERS) as pool:
-        fits = sorted(pool.map(rough, promising), key=everywhere)
-        least = min((everywhere(item) for item in fits), default=0.0)
-        if known is not None:
-            least = min(least, max(everywhere(known), TIED))
-        hopeful = [item for item in fits if everywhere(item) <= HOPELESS * least][:FINE]
-        hopeful = fits if data.part.exact else hopeful
-        rest = [fitting.at(data, item.values, item.z) for item in fits[len(hopeful) :]]
-        fits = sorted([*pool.map(fine, hopeful), *rest], key=lambda item: item.cost)
-    if fits and remaining(fits[0]) > MATERIAL and (known is None or hopeful):
+    fits = sorted(each(rough, promising), key=everywhere)
+    least = min((everywhere(item) for item in fits), default=0.0)
+    if known is not None:
+        least = min(least, max(everywhere(known), TIED))
+    hopeful = [item for item in fits if everywhere(item) <= HOPELESS * least][:FINE]
+    hopeful = fits if data.part.exact else hopeful
+    rest = [fitting.at(data, item.values, item.z) for item in fits[len(hopeful) :]]
+    fits = sorted([*each(fine, hopeful), *rest], key=lambda item: item.cost)
+    if fits and remaining(fits[0]) > MATERIAL and (known is None or fitting.near(fits[0], known)):
         fits[0] = fitting.fit(data, fits[0].values, fits[0].z, STEPS, rounds=3)
     return fits
 

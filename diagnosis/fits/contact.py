@@ -8,7 +8,6 @@ stiffness is lengthened which fits best shortly after the first contact.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +17,7 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import cost, simplest
 from diagnosis.fits.residuals import Data
-from diagnosis.fits.screening import WORKERS
+from diagnosis.fits.threads import each
 from laboratories.effects.effect import Effect
 from models.registry import Array
 
@@ -53,14 +52,13 @@ def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
         for share in INSIDE
         for stiffness in stop.starts
     ]
-    with ThreadPoolExecutor(WORKERS) as pool:
-        near = list(pool.map(lambda start: beginning(data, fit, effect, start, groups), starts))
-        each = len(stop.starts)
-        kept = (min(near[place : place + each], key=cost) for place in range(0, len(near), each))
-        best = [item.values[effect.name] for item in kept]
-        further = [under for values in best for under in further_laws(effect, values)]
-        begun = [*starts, *further]
-        fits = list(pool.map(lambda start: grown(data, fit, effect, start, groups), begun))
+    near = each(lambda start: beginning(data, fit, effect, start, groups), starts)
+    count = len(stop.starts)
+    kept = (min(near[place : place + count], key=cost) for place in range(0, len(near), count))
+    best = [item.values[effect.name] for item in kept]
+    further = [under for values in best for under in further_laws(effect, values)]
+    begun = [*starts, *further]
+    fits = each(lambda start: grown(data, fit, effect, start, groups), begun)
     springs, others = by_law(fits, effect.name)
     return simplest(min(springs, key=cost), others)
 

@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 
 from diagnosis.fits.hypothesis import Problem, Values, lay
 from diagnosis.fits.residuals import Data
+from diagnosis.fits.threads import each
 from diagnosis.recorded.parts import Building
 from models.registry import Array
 
@@ -26,6 +27,10 @@ MOSTLY = (
 )
 NEAR = 1.0  # tolerances within which fits begin: a parameter that is further away imitates an effect
 LOST = 100.0  # mean square residual in σ² from which on fitted nominal parameters mean nothing
+# Times what a rival leaves, beyond which a fit comes no nearer by further steps or at the bottom of its valley: these
+# have taken away a third of what a fit left at most.
+CLOSE = 3.0
+TIED = 9.0  # cost by which hypotheses differ that can be told apart: 3 standard deviations squared
 POLISHED = 12  # steps of a fit that leaves something, before that counts
 
 
@@ -114,6 +119,11 @@ def excess(fit: Fit) -> float:
     return max(0.0, fit.chi - fit.reduced.size) + fit.prior
 
 
+def near(fit: Fit, rival: Fit) -> bool:
+    """Whether a fit that has been moved on for long may still leave no more than a rival."""
+    return excess(fit) < CLOSE * max(excess(rival), TIED)
+
+
 def moved(data: Data, fit: Fit, steps: int, slopes: Array | None, weights: Array) -> Fit:
     """A fit moved to the best parameters under weights of the signals."""
     problem = Problem(data, fit.values, slopes, weights)
@@ -175,5 +185,5 @@ def polished(found: Fit) -> Fit:
         for name, values in found.values.items()
     }
     starts = [found.values, usual] if usual != found.values else [found.values]
-    fits = [fit(found.data, values, z, POLISHED, rounds=3) for values in starts]
+    fits = each(lambda values: fit(found.data, values, z, POLISHED, rounds=3), starts)
     return min([found, *fits], key=lambda item: item.cost)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.fits.residuals import Data
+from diagnosis.fits.threads import each
 from laboratories.effects.effect import Effect, Parameter
 from models.registry import Array
 from models.system import System
@@ -158,16 +159,18 @@ class Problem:
     ) -> Array:
         """Differences of the residuals over some of the parameters, (groups·signals, parameters), to a side: 1, -1."""
         here = self.reduced(p).ravel() if here is None else here
-        columns = []
         low, high = self.bounds()
-        for place in range(first, p.size if last is None else last):
+
+        def slope(place: int) -> Array:
             step = side * self._step * self._share(place, float(p[place]))
             if not low[place] <= p[place] + step <= high[place]:
                 step = -step
             moved = p.copy()
             moved[place] += step
             there = self.data.reduced(lay(self.data, moved[: self.count], self.values(moved)))
-            columns.append((there.ravel() - here) / step)
+            return np.asarray((there.ravel() - here) / step)
+
+        columns = each(slope, range(first, p.size if last is None else last))
         return np.stack(columns, axis=1) if columns else np.zeros((here.size, 0))
 
     def _share(self, place: int, value: float) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,10 +12,9 @@ from scipy.optimize import lsq_linear
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import NEAR, Fit
 from diagnosis.fits.scales import Scales
+from diagnosis.fits.threads import each
 from laboratories.effects.effect import Effect
 from models.registry import Array
-
-WORKERS = 2  # threads: kernels release the interpreter's lock
 
 
 @dataclass(frozen=True)
@@ -77,11 +75,7 @@ class Plane:
 def screen(fit: Fit, effects: Iterable[Effect], scales: Scales) -> list[ScreenedEffect]:
     """What each effect could gain over a fit, best first."""
     plane = Plane(fit)
-
-    with ThreadPoolExecutor(WORKERS) as pool:
-        found = [
-            item for items in pool.map(lambda effect: look(effect, plane, scales), effects) for item in items
-        ]
+    found = [item for items in each(lambda effect: look(effect, plane, scales), effects) for item in items]
     return sorted(found, key=lambda item: -item.gain)
 
 

@@ -76,7 +76,7 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
         best = candidates.exchanged(better[0], scales) if len(better[0].names) > 1 else better[0]
         chosen = settling.settled(best, bare.data)
         if chosen.data is not bare.data:
-            bare, *first = (settling.again(fit, chosen.data) for fit in (bare, *first))
+            bare, *first = settling.all_again((bare, *first), chosen.data)
             if len(chosen.names) == 1 and not worth.is_worth(bare, bare, chosen):
                 return bare, bare, first, None
         if len(chosen.names) >= MOST or worth.enough(bare, chosen):
@@ -154,7 +154,7 @@ def likeliest(search: Search) -> Search:
     chosen = search.chosen
     same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
     best = min(same, key=lambda fit: fit.cost, default=chosen)
-    if best.cost > chosen.cost - candidates.TIED or remaining(best) > remaining(chosen):
+    if best.cost > chosen.cost - fitting.TIED or remaining(best) > remaining(chosen):
         return search
     rest = [chosen, *(item for item in search.alternatives if item is not best)]
     return replace(search, chosen=best, alternatives=tuple(rest))

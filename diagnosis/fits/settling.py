@@ -6,6 +6,7 @@ coloured noise may be an effect, so that effects are held against noise as well.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +15,9 @@ from diagnosis.fits import candidates, evidence, fitting, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.screening import screen
+from diagnosis.fits.screening import ScreenedEffect, screen
 from diagnosis.fits.sensor_noise import quieter
+from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, gaps, leaves, model_error
 from diagnosis.fits.worth import is_gap
 from diagnosis.signals.mask import Mask
@@ -91,6 +93,11 @@ def again(fit: Fit, data: Data) -> Fit:
     if sensor_noise.altered(data):
         return fitting.fit(data, fit.values, fit.z, STEPS, rounds=1)
     return fitting.at(data, fit.values, fit.z)
+
+
+def all_again(fits: Iterable[Fit], data: Data) -> list[Fit]:
+    """Fits moved to the best parameters under another noise, as `again` does."""
+    return each(lambda fit: again(fit, data), fits)
 
 
 def hidden(fit: Fit, accepted: Data | None = None) -> bool:
@@ -176,7 +183,8 @@ def far_likelier_ones(bare: Fit, fits: list[Fit]) -> tuple[Fit, list[Fit]]:
     best, bare = settled(fits[0], bare.data), as_near(bare, fits[0])
     if not far_likelier(best, bare):
         return bare, []
-    return again(bare, best.data), [best, *(again(item, best.data) for item in fits[1:])]
+    bare, *others = all_again((bare, *fits[1:]), best.data)
+    return bare, [best, *others]
 
 
 def as_near(bare: Fit, fit: Fit) -> Fit:
@@ -194,10 +202,11 @@ def in_white_noise(bare: Fit, scales: Scales) -> list[Fit]:
     near = fitting.begun(white)
     slopes = near.jacobian[:, : bare.z.size]
     found = screen(near, white.data.part.candidates, scales)[:RIVALS]
-    fits = [
-        fitting.fit(near.data, {item.effect.name: item.values}, item.z, ROUGH, slopes, rounds=1)
-        for item in found
-    ]
+
+    def rough(item: ScreenedEffect) -> Fit:
+        return fitting.fit(near.data, {item.effect.name: item.values}, item.z, ROUGH, slopes, rounds=1)
+
+    fits = each(rough, found)
     whole = [fitting.at(white.data, item.values, item.z) for item in fits]
     return sorted(whole, key=lambda item: item.cost)
 

@@ -13,11 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from diagnosis.fits import candidates, fitting, worth
-from diagnosis.fits.candidates import TIED
-from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.fitting import TIED, Fit, excess
 from diagnosis.fits.hypothesis import Problem, left_out
 from diagnosis.fits.laws.best import descended, raced
 from diagnosis.fits.scales import Scales
+from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import leaves
 
 # Squared distance of two predictions, in noise. Where one of them is true, their costs differ by this distance, give or
@@ -27,7 +27,6 @@ RIVALS = 2  # single effects behind the best one that are tried with a second on
 # Of what one effect by itself leaves: less must be left after a few steps under another of its laws if this is to do
 # what two effects do. A spring and dashpot in series beside a column leave 0.3 then, in place of a dashpot and a lag.
 NEARING = 0.5
-CLOSE = 3.0  # times what two effects leave: one that leaves less is moved to the bottom of its valley
 TRIED = 3  # candidates that are fitted in such a place: they must come close at once
 
 
@@ -108,8 +107,7 @@ def under_others(fit: Fit) -> list[Fit]:
             rest = {key: values for key, values in fit.values.items() if key not in (gone, name)}
             less = fitting.fit(fit.data, rest | {name: fit.values[name]}, fit.z)
             result += raced([less], NEARING * excess(less)).values()
-    near = [item for item in result if excess(item) < CLOSE * max(excess(fit), TIED)]
-    return [descended(item) for item in near]
+    return each(descended, [item for item in result if fitting.near(item, fit)])
 
 
 def parted(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:

@@ -137,7 +137,7 @@ def test_a_search_reports_its_effect_the_explained_share_and_costlier_alternativ
     assert fitting.excess(found.chosen) < 0.01 * fitting.excess(found.commissioned)
     costs = [item.cost for item in found.alternatives]
     assert costs == sorted(costs)
-    assert costs[0] > found.chosen.cost + candidates.TIED
+    assert costs[0] > found.chosen.cost + fitting.TIED
 
 
 def test_no_more_delay_is_taken_away_than_there_is(cases: Cases) -> None:

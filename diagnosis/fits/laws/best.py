@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import minimize
 
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit, excess
-from diagnosis.fits.hypothesis import Problem
+from diagnosis.fits.hypothesis import Problem, Values
 from diagnosis.fits.laws.specimen import following, path
 from diagnosis.fits.laws.starts import starts
-from diagnosis.fits.screening import WORKERS
+from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import remaining
 from laboratories.effects.effect import Effect
 from models.registry import Array
 
 FITTED = 4  # of an effect's laws, those with the best starts
+LAID = 3  # of the starts of a law over a beginning, those that are laid over the whole test
 ROUGH = 3  # steps of a first fit, after which laws are held against each other
 LEADING = 4  # of all laws, those that are fitted to their end
 STEPS, ROUNDS = 8, 2  # of such a fit
@@ -69,11 +69,10 @@ def raced(fits: list[Fit], most: float = math.inf) -> dict[str, Fit]:
     starts = [start for item in firsts.values() for start in begun(item)]
     most = min(most, FARTHEST * min(map(excess, fits)))
     found: dict[str, list[Fit]] = {}
-    with ThreadPoolExecutor(WORKERS) as pool:
-        rough = sorted(pool.map(lambda start: fitted(start, ROUGH, 1), starts), key=cost)
-        leading = [item for item in rough[:LEADING] if excess(item) <= most]
-        for item in pool.map(lambda item: fitted(item, STEPS, ROUNDS), leading):
-            found.setdefault(item.names[-1], []).append(item)
+    rough = sorted(each(lambda start: fitted(start, ROUGH, 1), starts), key=cost)
+    leading = [item for item in rough[:LEADING] if excess(item) <= most]
+    for item in each(lambda item: fitted(item, STEPS, ROUNDS), leading):
+        found.setdefault(item.names[-1], []).append(item)
     chosen = {name: simplest(firsts[name], others) for name, others in found.items()}
     return {name: item for name, item in chosen.items() if item is not firsts[name]}
 
@@ -97,7 +96,8 @@ def begun(fit: Fit) -> list[Fit]:
     way = path(fit.data.part)
     models = sorted({law.model for law in last(fit).laws[1:] if law.model}) if way is not None else []
     known = tuple(item.tobytes() for item in way) if way is not None else ()
-    followed = {model: following(model, *known).parameters for model in models}
+    found = each(lambda model: following(model, *known), models)
+    followed = {item.model: item.parameters for item in found}
     places = range(1, len(last(fit).laws))
     return sorted((begun_under(fit, place, followed) for place in places), key=cost)[:FITTED]
 
@@ -109,11 +109,20 @@ def begun_under(fit: Fit, place: int, followed: Mapping[str, Mapping[str, float]
     which models of specimens follow the measured path, by model.
     """
     effect = last(fit)
-    begun = (
-        fitting.at(fit.data, fit.values | {effect.name: values}, np.zeros(fit.z.size))
-        for values in starts(fit, effect, place, followed)
+    return cheapest(
+        fit, [fit.values | {effect.name: values} for values in starts(fit, effect, place, followed)]
     )
-    return min(begun, key=cost)
+
+
+def cheapest(fit: Fit, starts: Sequence[Values]) -> Fit:
+    """Of hypotheses with the plan's parameters the one that costs least over the test, of those best over a beginning.
+
+    The beginning holds most of what the fit leaves, so that those which cost much there cost much over the whole test.
+    """
+    z = np.zeros(fit.z.size)
+    short = fitting.beginning(fit.data, fit, fitting.MOSTLY)
+    over = sorted(each(lambda values: fitting.at(short, values, z), starts), key=cost)[:LAID]
+    return min(each(lambda item: fitting.at(fit.data, item.values, z), over), key=cost)
 
 
 def last(fit: Fit) -> Effect:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.fits import fitting, hypothesis
-from diagnosis.fits.fitting import Fit
+from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Values
-from diagnosis.fits.laws.best import FITTED, ROUNDS, cost, descended, fitted
+from diagnosis.fits.laws.best import FARTHEST, FITTED, ROUGH, ROUNDS, cost, descended, fitted
 from diagnosis.fits.laws.specimen import as_specimen, following, path, within
+from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import leaves
 from laboratories.effects.effect import Effect
 from models.specimens.fit import SpecimenFit
@@ -49,18 +50,27 @@ def coupled(fit: Fit, first: list[Fit]) -> list[Fit]:
         if law.model and effect.name not in fit.names
     ]
     models = sorted({effect.laws[place].model for effect, place in places})
-    found = {model: following(model, *(item.tobytes() for item in way)) for model in models}
+    known = tuple(item.tobytes() for item in way)
+    found = {item.model: item for item in each(lambda model: following(model, *known), models)}
     starts = [
         (found[effect.laws[place].model].nrmse, beside(fit, effect, place, found[effect.laws[place].model]))
         for effect, place in places
     ]
     tried = {item.names for item in first}
     starts = [item for item in starts if item[0] < NEARLY * left and tuple(item[1]) not in tried]
-    known = sorted(starts, key=lambda item: item[0])
-    begun = [fitting.at(fit.data, fit.values | values, np.zeros(fit.z.size)) for _, values in known[:FITTED]]
+    nearest = sorted(starts, key=lambda item: item[0])[:FITTED]
+    begun = [fitting.at(fit.data, fit.values | values, np.zeros(fit.z.size)) for _, values in nearest]
     leading = sorted(begun, key=cost)[:TOGETHER]
-    done = (descended(fitted(item, LONG, ROUNDS)) for item in leading)
-    return sorted((item for item in done if works(item, float(np.max(np.abs(way[1]))))), key=cost)
+    force = float(np.max(np.abs(way[1])))
+    return sorted((item for item in moved_on(leading, best) if works(item, force)), key=cost)
+
+
+def moved_on(starts: list[Fit], best: Fit) -> list[Fit]:
+    """Fits from starts, each moved on as long as it may still leave no more than the best one known."""
+    rough = each(lambda item: fitted(item, ROUGH, 1), starts)
+    hopeful = [item for item in rough if excess(item) <= FARTHEST * excess(best)]
+    done = each(lambda item: fitted(item, LONG, ROUNDS), hopeful)
+    return each(lambda item: descended(item) if fitting.near(item, best) else item, done)
 
 
 def works(fit: Fit, force: float) -> bool:

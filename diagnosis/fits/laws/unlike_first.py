@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.laws.starts import gridded
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.screening import WORKERS, Plane, ScreenedEffect
+from diagnosis.fits.screening import Plane, ScreenedEffect
+from diagnosis.fits.threads import each
 from laboratories.effects.effect import Effect
 
 
@@ -41,6 +41,5 @@ def unlike_first(fit: Fit, scales: Scales) -> list[ScreenedEffect]:
         found = [promised(way[0], values) for values in gridded(fit, *way, scales)]
         return sorted(found, key=lambda item: -item.gain)[:1]
 
-    with ThreadPoolExecutor(WORKERS) as pool:
-        found = [item for items in pool.map(best, ways) for item in items]
+    found = [item for items in each(best, ways) for item in items]
     return sorted(found, key=lambda item: -item.gain)
