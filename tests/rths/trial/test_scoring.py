@@ -12,6 +12,7 @@ import pytest
 
 from common.roles import MASTER, SLAVE
 from diagnosis.report import read
+from diagnosis.report.values import Value
 from tests.rths.diagnosis_report.pieces import bare
 from tests.rths.report.pages import check_alone, check_in_browser
 from validation.blind.cases.case import Case, Laid
@@ -32,7 +33,7 @@ from validation.blind.results.measures import (
     results,
 )
 from validation.blind.results.page import page
-from validation.blind.results.scoring import Outcome, judge, judge_all, same
+from validation.blind.results.scoring import Outcome, estimate, judge, judge_all, same
 
 SLIP = Laid("column.slip", "column", {"gap": 2e-4}, {"gap": 0.0}, role=MASTER)
 SOFT = Laid("column.stiffness", "column", {"factor": 0.9}, {"factor": 1.0}, role=MASTER)
@@ -222,6 +223,18 @@ def some() -> list[Outcome]:
         judged(case("clean", index=22), answer("no_gap")),
         judged(case("unknown", CABLE, index=23), answer("unknown_effect", site="damper"), seconds=9.0),
     ]
+
+
+def test_the_coefficient_of_a_power_law_is_judged_at_the_catalogues_speed() -> None:
+    laid = Laid("column.viscous", "column", {"coefficient": 1e4}, {"coefficient": 0.0}, "power", MASTER)
+    true = 1e4 * (0.1 / 0.02) ** -0.2  # the same force at 0.1 m/s as at 0.02 m/s
+    for said, held in ((true, True), (1e4, False)):
+        value = Value(value=said, interval=(0.99 * said, 1.01 * said), unit="N·s/m")
+        judged = estimate(laid, laid.name, "coefficient", value)
+        assert judged.true == pytest.approx(true)
+        assert judged.inside == held
+    linear = replace(laid, formula="maxwell")
+    assert estimate(linear, laid.name, "coefficient", None).true == 1e4
 
 
 def test_measures_pass_and_fail_against_their_goals() -> None:

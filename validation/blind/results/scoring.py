@@ -321,7 +321,10 @@ def estimates(case: Case, heard: Sequence[Heard], names: CaseNames) -> list[Judg
 
 def estimate(item: Laid, called: str, name: str, said: Value | None) -> JudgedEstimate:
     """One parameter; relative to its distance from the null value where that is finite."""
-    true, null = item.parameters[name], item.nulls[name]
+    from validation.blind.labs.meanings import as_in_catalogue  # compiles kernels
+
+    null = item.nulls[name]
+    true = as_in_catalogue(item.name, item.formula, name, item.parameters[name])
     value = number(said.value if said else None)
     miss = abs(value - true) if math.isfinite(value) else math.inf
     strength = abs(true - null) if math.isfinite(null) else abs(true)
