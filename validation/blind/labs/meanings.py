@@ -6,7 +6,7 @@ from models import dashpot
 from validation.blind.labs.parts import specimen
 
 # The force of a power law is c·v₀·|v/v₀|ᵃ, so that its coefficient depends on the speed v₀ at which it is stated.
-FACTORS = {
+FACTORS: dict[tuple[str, str, str], float] = {
     ("column.viscous", "power", "coefficient"): (dashpot.REFERENCE / specimen.POWER_AT)
     ** (specimen.POWER - 1.0)
 }
