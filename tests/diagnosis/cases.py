@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from common.errors import InterlockError, RthsError
 from common.plan import read as plans
@@ -79,26 +83,26 @@ def lab_b(whole: Record) -> LaboratoryPart:
 
 
 class Cases:
-    """Recordings and reports, each made at its first request."""
+    """Recordings and reports, each made at its first request, by any of the workers that share a run's tests."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self._files: dict[Any, Path] = {}
-        self._reports: dict[Any, dict[str, Any]] = {}
+    def __init__(self, factory: pytest.TempPathFactory) -> None:
+        base = factory.getbasetemp()
+        self.folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cases"
+        self.folder.mkdir(exist_ok=True)
 
     def file(
         self, effects: Effects | None = None, seed: int = 1, duration: float = SECONDS, scale: float = 0.1
     ) -> Path:
         """The recording of a case; `seed` draws the noise and the errors of the nominal parameters (0: no errors)."""
         chosen = effects or {}
-        key = (repr(chosen), seed, duration, scale)
-        if key not in self._files:
-            path = self.folder / f"{len(self._files):03d}.mcap"
-            base = short(duration, scale=scale)
-            error = play(base, tables(base, chosen, jitter(seed) if seed else {}, seed), path)
+        key = repr((chosen, seed, duration, scale))
+        path = self.folder / f"{hashlib.sha256(key.encode()).hexdigest()[:16]}.mcap"
+        if not path.exists():
+            begun, base = path.with_suffix(f".{os.getpid()}.mcap"), short(duration, scale=scale)
+            error = play(base, tables(base, chosen, jitter(seed) if seed else {}, seed), begun)
             assert error is None or isinstance(error, InterlockError)
-            self._files[key] = path
-        return self._files[key]
+            begun.replace(path)
+        return path
 
     def record(self, effects: Effects | None = None, **options: Any) -> Record:
         """The recording laid out."""
@@ -106,10 +110,14 @@ class Cases:
 
     def report(self, effects: Effects | None = None, **options: Any) -> dict[str, Any]:
         """The diagnosis of a case."""
-        key = (repr(effects or {}), *sorted(options.items()))
-        if key not in self._reports:
-            self._reports[key] = diagnose_file(self.file(effects, **options)).plain()
-        return self._reports[key]
+        recording = self.file(effects, **options)
+        path = recording.with_suffix(".json")
+        if not path.exists():
+            begun = path.with_suffix(f".{os.getpid()}.json")
+            begun.write_text(json.dumps(diagnose_file(recording).plain()), encoding="utf-8")
+            begun.replace(path)
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        return found
 
 
 def named(report: Mapping[str, Any]) -> list[str]:

@@ -10,4 +10,4 @@ from tests.diagnosis.cases import Cases
 @pytest.fixture(scope="session")
 def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
     """Recordings with known secrets, made on demand."""
-    return Cases(tmp_path_factory.mktemp("cases"))
+    return Cases(tmp_path_factory)

@@ -28,7 +28,7 @@ FRICTION = {"damper.friction": {"force": 3.0}}
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
     """Recordings with known secrets, made on demand."""
-    return Cases(tmp_path_factory.mktemp("cases"))
+    return Cases(tmp_path_factory)
 
 
 def plan_of(path: Path) -> Plan:

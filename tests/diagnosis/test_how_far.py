@@ -13,6 +13,7 @@ from common.recording.reader import read
 from common.roles import MASTER
 from diagnosis.diagnose import examine
 from diagnosis.findings import gaps, how_far, where
+from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.where import SiteTrace
 from diagnosis.recorded import record
 from diagnosis.recorded.loop import closed_share, overall
@@ -123,25 +124,35 @@ def without_table_target(cases: Cases) -> record.Record:
     return record.build(run)
 
 
-def test_without_a_loop_the_parts_are_judged_by_themselves(cases: Cases) -> None:
-    found = examine(without_table_target(cases))
-    far = how_far.judge(found, ())
+@pytest.fixture(scope="module")
+def loopless(cases: Cases) -> Diagnosis:
+    """The findings in a recording that holds no closed loop."""
+    return examine(without_table_target(cases))
+
+
+@pytest.fixture(scope="module")
+def rubbing(cases: Cases) -> Diagnosis:
+    """The findings in a recording of a column with friction."""
+    return examine(cases.record(FOUND["column"]))
+
+
+def test_without_a_loop_the_parts_are_judged_by_themselves(cases: Cases, loopless: Diagnosis) -> None:
+    far = how_far.judge(loopless, ())
     closed = far.how_far.plain()
     assert closed["closed"] > 0.9
     assert closed["after"] == pytest.approx(closed["noise_floor"], rel=0.15)
     assert not far.warnings
-    judged = how_far.judge(found, [without_table_target(cases)])
+    judged = how_far.judge(loopless, [without_table_target(cases)])
     assert judged.how_far.judged_on == "other recordings"
     assert judged.how_far.plain()["closed"] > 0.9
 
 
-def test_a_recording_of_other_parts_judges_nothing_and_says_so(cases: Cases) -> None:
-    found = examine(without_table_target(cases))
+def test_a_recording_of_other_parts_judges_nothing_and_says_so(cases: Cases, loopless: Diagnosis) -> None:
     run = read(cases.file(FOUND["damper"]))
     for name in ("table_target", "table_command", "damper_command", "actuator_command", "column_force"):
         for topic in ("master", "slave"):
             run.columns[topic].pop(name, None)
-    warned = how_far.judge(found, [record.build(run)])
+    warned = how_far.judge(loopless, [record.build(run)])
     assert warned.how_far.judged_on == "interleaved (interpolation)"
     assert any("no part" in text for text in warned.warnings)
 
@@ -160,17 +171,16 @@ def test_a_falsified_reading_counts_once_in_the_noise_floor(cases: Cases, effect
 
 
 def test_a_named_site_keeps_its_trace_where_something_is_left_there(
-    cases: Cases, monkeypatch: pytest.MonkeyPatch
+    rubbing: Diagnosis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = examine(cases.record(FOUND["column"]))
     partly = [
-        dataclasses.replace(item, outcome="partly") if item.effects else item for item in found.verdicts
+        dataclasses.replace(item, outcome="partly") if item.effects else item for item in rubbing.verdicts
     ]
     left = SiteTrace("column", np.ones(3), 1.0, "column_force", 1.0)
     monkeypatch.setattr(where, "unexplained", lambda *_: left)
     traces = [
         item
-        for item in how_far.all_traces(dataclasses.replace(found, verdicts=partly))
+        for item in how_far.all_traces(dataclasses.replace(rubbing, verdicts=partly))
         if item.site == "column"
     ]
     assert len(traces) == 1
@@ -191,11 +201,10 @@ def test_the_closed_share_is_that_of_the_gap_above_the_noise() -> None:
     assert overall({}) == 0.0
 
 
-def test_a_diverging_simulation_is_reported_as_a_gap(cases: Cases) -> None:
-    found = examine(cases.record(FOUND["column"]))
-    judge = gaps.RecordingGaps(found, found.record, gaps.held_out(found.record))
+def test_a_diverging_simulation_is_reported_as_a_gap(rubbing: Diagnosis) -> None:
+    judge = gaps.RecordingGaps(rubbing, rubbing.record, gaps.held_out(rubbing.record))
     assert judge.loop is not None
-    systems = found.systems()
+    systems = rubbing.systems()
     wild_systems = systems | {MASTER: systems[MASTER].moved("actuator", delay=0.2)}
     wild = judge.loop.simulate(wild_systems)
     assert set(judge.gap(wild).values()) == set(judge.gap(None).values()) == {10.0}

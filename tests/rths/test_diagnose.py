@@ -26,7 +26,7 @@ FRICTION = {"damper.friction": {"force": 3.0}}
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
     """Recordings with known hidden effects, made on demand."""
-    return Cases(tmp_path_factory.mktemp("cases"))
+    return Cases(tmp_path_factory)
 
 
 def checked(path: Path) -> dict[str, Any]:
