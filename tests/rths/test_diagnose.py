@@ -77,8 +77,16 @@ def test_diagnose_writes_report_page_and_summary(
     assert page.startswith("<!doctype html>")
     assert not re.findall(r"(?:src|href)=[\"'](?!#|data:)", page)  # nothing is loaded from elsewhere
     assert str(path.parent) not in page
+
+
+def test_a_report_on_standard_output_is_that_of_a_file(
+    call: Any, capsys: Any, cases: Cases, tmp_path: Path
+) -> None:
+    out, path = tmp_path / "gap.json", cases.file(duration=2.0)
+    assert call("diagnose", path, "--json", out, "--found", tmp_path / "found.toml") == 0
+    capsys.readouterr()
     assert call("diagnose", path, "--json", "-") == 0
-    assert json.loads(capsys.readouterr().out) == report | {"found": None}
+    assert json.loads(capsys.readouterr().out) == checked(out) | {"found": None}
 
 
 def left(measured: Path, simulated: Path) -> float:
