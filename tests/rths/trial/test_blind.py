@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
+import io
 import json
 import math
 import os
@@ -30,6 +32,7 @@ from laboratories.effects import CATALOGUE
 from rths.examine.diagnose import write_found
 from rths.prove import blind
 from tests.rths.diagnosis_report.pieces import bare
+from validation.blind import judge, worker
 from validation.blind import library as libraries
 from validation.blind.cases.basis import basis
 from validation.blind.cases.case import Case
@@ -86,6 +89,21 @@ def as_planned(path: Path, found: Path) -> Report:
 @pytest.fixture(autouse=True)
 def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(libraries, "of_plan", lambda _plan, _reached: LIBRARY)
+
+
+@pytest.fixture
+def inside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The diagnosis runs in this process: to start another one takes longer than such a trial."""
+
+    def work(words: list[str], _place: Path, _jobs: int, done: Callable[[str], None]) -> None:
+        said = io.StringIO()
+        monkeypatch.setattr(sys, "argv", ["worker", *words])
+        with contextlib.redirect_stdout(said):
+            assert worker.main() == 0
+        for name in said.getvalue().split():
+            done(name)
+
+    monkeypatch.setattr(judge, "_work", work)
 
 
 def cases(count: int, *only: str, duration: float = 1.5, effects: Sequence[str] = ()) -> list[Case]:
@@ -145,6 +163,7 @@ def test_a_failing_diagnosis_does_not_affect_the_other_cases(tmp_path: Path) -> 
         diagnose_all(tmp_path, diagnosis="rths.nowhere:x")
 
 
+@pytest.mark.usefixtures("inside")
 def test_the_next_test_of_every_case_is_predicted_and_judged(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -217,6 +236,7 @@ def test_the_command_scores_the_cases_and_keeps_the_results(
         assert read(folder / "recording.mcap").finished
 
 
+@pytest.mark.usefixtures("inside")
 def test_single_cases_of_a_set_are_the_same_as_among_all(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -233,6 +253,7 @@ def test_single_cases_of_a_set_are_the_same_as_among_all(
     }
 
 
+@pytest.mark.usefixtures("inside")
 def test_the_command_passes_where_every_goal_is_met(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -300,6 +321,7 @@ def test_a_missing_package_gives_one_sentence(
     )
 
 
+@pytest.mark.usefixtures("inside")
 def test_a_trial_goes_on_where_it_was_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     words = ("--cases", "2", "--only", "clean", "--duration", "1.5", "--diagnosis", f"{HERE}:no_gap")
     monkeypatch.setattr("validation.blind.results.page.page", lambda *_: "drawn elsewhere")
