@@ -31,6 +31,9 @@ class Parameter:
         ""  # recorded signal whose peak scales the sizes; empty: the site's signal of the same unit
     )
     believed: float = math.inf  # largest value that a search accepts
+    bends_by: str = (
+        ""  # of a level that a signal does not exceed: the shape that says how suddenly it bends there
+    )
     smoothing: float = (
         0.0  # for a velocity that smooths a law near rest: its share of the peak velocity in a search
     )

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm, t
 
-from diagnosis.findings.certainty.intervals import Spread, covariance, mixed, refined, spread
+from diagnosis.findings.certainty.intervals import Spread, covariance, formulas, mixed, refined, spread
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import Problem
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_b
 
@@ -79,3 +80,22 @@ def test_parameters_are_refined_on_the_rows_that_selection_did_not_see(cases: Ca
     seen, whole = (np.diag(spread(item).noise)[item.z.size :] for item in (fit, better))
     assert np.all(whole < seen)
     assert better.values["damper.friction"]["force"] == pytest.approx(3.0, rel=0.03)
+
+
+@pytest.mark.parametrize("limit", [60.0, 120.0])
+def test_a_level_that_a_reading_does_not_go_beyond_is_as_wide_as_formulas_differ(
+    cases: Cases, limit: float
+) -> None:
+    name = "sensor.damper_force.saturation"
+    whole = cases.record({name: {"limit": limit, "sharpness": 3.0}}, duration=8.0)  # it reaches 76 N
+    data = residuals.prepare(lab_b(whole), whole)
+    fit = fitting.fit(data, {name: {"limit": limit, "sharpness": 3.0}})
+    free = next(item for item in Problem(data, fit.values).frees if item.parameter.bends_by)
+    tanh = limit / 1.5 ** (1.0 / 3.0)
+    small = 0.1 * limit
+    assert tanh * np.tanh((small / tanh) ** 1.5) ** (1.0 / 1.5) == pytest.approx(
+        small / (1.0 + (small / limit) ** 3.0) ** (1.0 / 3.0), rel=1e-6
+    )
+    assert formulas(fit, free) == pytest.approx(np.log(limit / tanh), rel=0.1)
+    clipped = fitting.at(data, {name: {"limit": 20.0, "sharpness": 3.0}}, fit.z)
+    assert formulas(clipped, free) == 0.0

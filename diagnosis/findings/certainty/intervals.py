@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import norm, t
 
 from diagnosis.findings.verdict import PartVerdict, odds
-from diagnosis.fits import fitting
+from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Free, Problem
 from diagnosis.fits.residuals import BLOCK
@@ -31,6 +31,9 @@ STEPS = 8  # of the fit to all rows, which begins close to its end
 # would divide by almost nothing.
 ALONE = 0.9
 FEWEST = 4  # blocks from which on their scatter says anything
+# Of a level, up to which a signal would go without it, from which on its flat part tells where the level is. There two
+# formulas that agree below it differ by a tenth.
+BEYOND = 1.5
 HALVINGS = 60  # in which the end of an interval is found, to a part in 10¹⁸ of where it is looked for
 FARTHEST = 12.0  # standard deviations of the widest component within which an end is looked for
 
@@ -133,7 +136,9 @@ def intervals(verdict: PartVerdict) -> dict[str, dict[str, Interval]]:
     result: dict[str, dict[str, Interval]] = {}
     left = systematic(fit)
     for i, item in enumerate(problem.frees, start=fit.z.size):
-        half = math.hypot(sure.half(i), NORMAL * math.sqrt(left * max(sure.noise[i, i], 0.0)))
+        half = math.hypot(
+            sure.half(i), NORMAL * math.sqrt(left * max(sure.noise[i, i], 0.0)), formulas(fit, item)
+        )
         shifts = ((moved_by(search.chosen, other, item), chance) for other, chance in chances)
         others = [(shift, chance) for shift, chance in shifts if shift is not None]
         ends = (place[i] + end for end in mixed(half, others))
@@ -159,6 +164,24 @@ def systematic(fit: Fit) -> float:
     each = gaps(fit, fit.data.group)
     shares = [item.ratio * weight for item, weight in zip(each, fitting.weights(fit), strict=True)]
     return float(np.sum(np.square(shares))) * fit.data.groups * fit.data.group
+
+
+def formulas(fit: Fit, item: Free) -> float:
+    """How far, as a fit moves it, another formula may put a level that the signal did not go beyond; 0 for others.
+
+    By value/(1 + |value/L|ⁿ)^(1/n) a reading is smaller by |value/L|ⁿ/n near zero, by L'·tanh(|value/L'|ᵐ)^(1/m) by
+    |value/L'|²ᵐ/(3m). These agree for m = n/2 and L' = L/1.5^(1/n).
+    """
+    given = fit.values[item.effect]
+    effect = fit.data.catalogue[item.effect]
+    if not item.parameter.bends_by or effect.signal not in fit.data.part.signals:
+        return 0.0
+    others = {name: values for name, values in fit.values.items() if name != item.effect}
+    free = fit.data.part.predict(hypothesis.lay(fit.data, fit.z, others))
+    peak = float(np.nanmax(np.abs(free[:, fit.data.part.signals.index(effect.signal)])))
+    return (
+        math.log(1.5) / given[item.parameter.bends_by] if peak < BEYOND * given[item.parameter.name] else 0.0
+    )
 
 
 def moved_by(chosen: Fit, other: Fit, item: Free) -> float | None:

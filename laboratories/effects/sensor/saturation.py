@@ -36,6 +36,7 @@ FAULT = ReadingFault(
         most=sized(signal.typical, 100.0)[0],
         sizes=sized(signal.typical, 4.0, 2.5, 1.6, 1.0),
         says="level that the reading does not exceed",
+        bends_by=SHARPNESS.name,
     ),
     says="the reading saturates",
     reference="reading = value/(1 + |value/limit|ⁿ)^(1/n)",
