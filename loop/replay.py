@@ -76,7 +76,7 @@ def column(system: System, deformation: Array) -> Array:
     force, result = np.empty(deformation.size), np.empty((deformation.size, 1))
     interval, effects, column = system.plan.test.interval, system.effects, system.plan.column
     sensors = readings.build(interval, ("column_force",), effects.sensors)
-    steps = column_lab.substeps(interval) if specimen.needs_substeps(effects.column) else 1
+    steps = column_lab.substeps(interval) if specimen.depends_on_steps(effects.column) else 1
     parts = specimen.build(replace(column, mass=0.0, damping=0.0), effects.column)
     play_column(parts, deformation, interval, steps, force)
     whole = specimen.with_rates(column, force, deformation, interval)

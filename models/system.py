@@ -34,7 +34,7 @@ class ColumnEffects:
 
     yield_displacement: float = math.inf  # m
     hardening: float = 0.0
-    exponent: float = 2.0  # sharpness of the transition: Bouc-Wen's n, Menegotto and Pinto's R₀
+    exponent: float = 2.0  # sharpness of the transition: Bouc-Wen's n, Menegotto and Pinto's R₀, also of bars
     law: float = 0.0  # index of the law of yielding in `laboratories.column.specimen.LAWS`
     turn: float = 0.0  # reversal over the yield displacement below which Menegotto and Pinto's branch goes on
     unloading: float = 0.0  # exponent of the unloading stiffness, of a peak-oriented or pinched specimen
@@ -46,6 +46,12 @@ class ColumnEffects:
     )
     damage: float = 0.0  # growth of that peak per plastic deformation of the yield displacement
     yield_asymmetry: float = 0.0  # strength of its positive side less that of the negative one over their sum
+    concrete: float = 5.0  # of a section of layers: stiffness of the concrete over that of the bars
+    axial: float = 0.0  # axial force over that at which all bars yield
+    concrete_strength: float = 0.5  # over its stiffness times the bars' yield strain
+    spalling: float = 0.0  # share of their strength that outer layers lose per strain at which bars yield
+    shaft: float = 0.6  # share of the flexibility outside the section
+    focus: float = 2.0  # strain in tension over that at which bars yield to which concrete unloads
     centring: float = math.inf  # m, deformation where a self-centring specimen bends
     centring_hardening: float = 0.05
     centring_loop: float = 0.5  # height of its flag over its force there

@@ -28,6 +28,12 @@ OF_YIELDING = (
     "pinch_displacement",
     "damage",
     "yield_asymmetry",
+    "concrete",
+    "axial",
+    "concrete_strength",
+    "spalling",
+    "shaft",
+    "focus",
 )
 OF_CENTRING = ("centring", "centring_hardening", "centring_loop")
 

@@ -43,6 +43,7 @@ LAWS = (
     "pinched_by_peak",
     "pinched_by_rest",
     "pinched_by_rest",
+    "layered",
 )  # of yielding, in the order of `ColumnEffects.law`
 PLAYS = ORIGIN, RESTING, HELD, PARTLY, ROUNDED = range(5)  # where the gap is: see `column.slip`
 IN_PLACE = 2  # of `ColumnEffects.friction_law`: a slider in the place of the planned specimen
@@ -153,22 +154,24 @@ def sliding(effects: ColumnEffects) -> Array:
 
 def yielding(stiffness: float, effects: ColumnEffects) -> Array:
     """Parameters of the law by which a column of that stiffness (N/m) yields, in the order of its kernel."""
-    limit = bending(effects.yield_displacement)
-    name = LAWS[int(effects.law)]
-    second = max(effects.second_stiffness, effects.hardening)  # a skeleton of three lines does not stiffen
-    skeleton = [stiffness, limit, effects.hardening, effects.first_bend, second]
+    name, hardening = LAWS[int(effects.law)], effects.hardening
+    shape: list[float] = []  # behind stiffness, yield displacement and hardening
     if name == "bouc_wen":
-        return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.5, 0.5])
-    if name == "menegotto_pinto":
-        return np.array([stiffness, limit, effects.hardening, effects.exponent, 0.925, 0.15, effects.turn])
-    if name == "clough":  # which has no negative hardening
-        return np.array([stiffness, limit, max(effects.hardening, 0.0), effects.unloading, 0.0, 0.0])
-    if name == "trilinear":
-        return np.array(skeleton)
+        shape = [effects.exponent, 0.5, 0.5]
+    elif name == "menegotto_pinto":
+        shape = [effects.exponent, 0.925, 0.15, effects.turn]
+    elif name == "clough":  # which has no negative hardening
+        hardening, shape = max(hardening, 0.0), [effects.unloading, 0.0, 0.0]
+    elif name == "layered":
+        concrete = [effects.concrete, effects.axial, effects.concrete_strength, effects.spalling]
+        shape = [*concrete, effects.exponent, effects.shaft, effects.focus]
+    elif name != "bilinear":
+        # a skeleton of three lines does not stiffen
+        shape = [effects.first_bend, max(effects.second_stiffness, hardening)]
     if name.startswith("pinched"):
         corner = [effects.pinch_force, effects.pinch_displacement]
-        return np.array([*skeleton, *corner, effects.unloading, effects.damage, effects.yield_asymmetry])
-    return np.array([stiffness, limit, effects.hardening])
+        shape += [*corner, effects.unloading, effects.damage, effects.yield_asymmetry]
+    return np.array([stiffness, bending(effects.yield_displacement), hardening, *shape])
 
 
 def with_rates(column: Column, force: Array, displacement: Array, interval: float) -> Array:
@@ -187,6 +190,16 @@ def needs_substeps(effects: ColumnEffects | None) -> bool:
     """Whether an effect depends on the rate of deformation, so that an interval must be divided into short steps."""
     more = effects or ColumnEffects()
     return bool(more.viscous or more.inertia or (more.friction and more.friction_law != IN_PLACE))
+
+
+def depends_on_steps(effects: ColumnEffects | None) -> bool:
+    """Whether the force at the end of a motion on a straight line depends on the steps in which it is made.
+
+    Friction and a plain dashpot have one rate on such a line.
+    """
+    more = effects or ColumnEffects()
+    behind_spring = more.viscous and more.viscous_law in (DASHPOT_IN_PLACE, DASHPOT_BESIDE)
+    return bool(more.inertia or behind_spring)
 
 
 @jit

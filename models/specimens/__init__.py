@@ -22,6 +22,7 @@ from models.specimens import (
     bouc_wen,
     bwbn,
     clough,
+    layered,
     linear,
     menegotto_pinto,
     pinched,
@@ -84,6 +85,7 @@ SPECIMENS = {
         SpecimenModel("pinched_by_peak", 9, pinched.PinchedParams, pinched.RULES, pinched.STATE_SIZE),
         SpecimenModel("pinched_by_rest", 10, pinched.PinchedParams, pinched.RULES, pinched.STATE_SIZE),
         SpecimenModel("slider", 11, slider.SliderParams, slider.RULES, slider.STATE_SIZE),
+        SpecimenModel("layered", 12, layered.LayeredParams, layered.RULES, layered.STATE_SIZE),
     )
 }
 CORNERS = 8  # by which the code of a further pinched model exceeds its corner of reloading in `pinched`
@@ -129,10 +131,20 @@ def step(kind: int, p: Array, s: Array, deformation: float) -> float:
         force = pinched.step(p, s, deformation, max(kind - CORNERS, pinched.ON_THE_WAY))
     elif kind == 7:
         force = trilinear.step(p, s, deformation)
-    elif kind == 8:
+    elif kind > 7:
+        force = further_step(kind, p, s, deformation)
+    else:
+        force = linear.step(p, s, deformation)
+    return force
+
+
+@jit
+def further_step(kind: int, p: Array, s: Array, deformation: float) -> float:
+    """`step` for the models that centre, slide, or have layers."""
+    if kind == 8:
         force = self_centring.step(p, s, deformation)
     elif kind == 11:
         force = slider.step(p, s, deformation)
     else:
-        force = linear.step(p, s, deformation)
+        force = layered.step(p, s, deformation)
     return force

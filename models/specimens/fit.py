@@ -131,6 +131,18 @@ FREE: dict[str, dict[str, SearchRange]] = {
     "pinched": PINCHED,
     "pinched_by_peak": PINCHED,
     "pinched_by_rest": PINCHED,
+    "layered": {
+        "stiffness": SearchRange(0.2, 100.0, (3.0,), "secant"),
+        "yield_displacement": SearchRange(0.02, 2.0, (0.12, 0.2, 0.35), "reach"),
+        "hardening": SearchRange(-0.1, 0.2, (0.0,), log=False),
+        "concrete": SearchRange(1.0, 30.0, (5.0,)),
+        "axial": SearchRange(0.03, 4.0, (0.3, 1.0)),
+        "strength": SearchRange(0.1, 3.0, (0.6,)),
+        "spalling": SearchRange(0.0, 0.5, (0.15,), log=False),
+        "sharpness": SearchRange(3.0, 20.0, (16.0,)),
+        "shaft": SearchRange(0.2, 0.9, (0.4, 0.75), log=False),
+        "focus": SearchRange(0.3, 30.0, (2.0,)),
+    },
     "self_centring": {
         "stiffness": STIFFNESS,
         "yield_displacement": YIELDING,

@@ -82,6 +82,21 @@ def bent(share: float, sharpness: float) -> float:
 
 
 @jit
+def on_branch(p: Array, s: Array, deformation: float) -> tuple[float, float]:
+    """Force (N) and stiffness (N/m) at a deformation (m) on the branch of the state."""
+    length = s[AIM] - s[START]
+    if length * s[WAY] <= 0.0:  # the reversal lies beyond the line of hardening already
+        slope = p[HARDENING] * p[STIFFNESS]
+        return s[START_FORCE] + slope * (deformation - s[START]), slope
+    share = (deformation - s[START]) / length
+    curved = bent(share, s[BENT])
+    height = s[AIM_FORCE] - s[START_FORCE]
+    force = s[START_FORCE] + (p[HARDENING] * share + (1.0 - p[HARDENING]) * curved) * height
+    steep = (curved / share) ** (1.0 + s[BENT]) if share != 0.0 else 1.0
+    return force, (p[HARDENING] + (1.0 - p[HARDENING]) * steep) * height / length
+
+
+@jit
 def step(p: Array, s: Array, deformation: float) -> float:
     """Force (N) at a deformation (m) reached from those of the calls before; `s` (10,) moves on."""
     moved = deformation - s[DEFORMATION]
@@ -90,16 +105,25 @@ def step(p: Array, s: Array, deformation: float) -> float:
     way = 1.0 if moved > 0.0 else -1.0
     if way != s[WAY] and (s[WAY] == 0.0 or abs(moved) > p[LEAST_TURN] * p[YIELD_DISPLACEMENT]):
         turn(p, s, way)
-    length = s[AIM] - s[START]
-    if length * s[WAY] <= 0.0:  # the reversal lies beyond the line of hardening already
-        force = s[START_FORCE] + p[HARDENING] * p[STIFFNESS] * (deformation - s[START])
-    else:
-        share = (deformation - s[START]) / length
-        curved = bent(share, s[BENT])
-        force = s[START_FORCE] + (p[HARDENING] * share + (1.0 - p[HARDENING]) * curved) * (
-            s[AIM_FORCE] - s[START_FORCE]
-        )
+    force = on_branch(p, s, deformation)[0]
     if way == s[WAY]:
         s[DEFORMATION] = deformation
         s[FORCE] = force
     return force
+
+
+@jit
+def looked_at(p: Array, s: Array, deformation: float, spare: Array) -> tuple[float, float]:
+    """Force (N) and stiffness (N/m) that `step` would reach at a deformation (m); `spare` (10,) is written over.
+
+    The least turn is taken as 0.
+    """
+    moved = deformation - s[DEFORMATION]
+    if moved == 0.0 and s[WAY] == 0.0:
+        return 0.0, p[STIFFNESS]
+    if moved * s[WAY] >= 0.0 and s[WAY] != 0.0:
+        return on_branch(p, s, deformation)
+    for place in range(STATE_SIZE):
+        spare[place] = s[place]
+    turn(p, spare, 1.0 if moved > 0.0 else -1.0)
+    return on_branch(p, spare, deformation)

@@ -58,7 +58,7 @@ def test_no_effects_of_one_model_are_tried_beside_a_fit_that_leaves_only_noise(
     data = data_of(FrictionDamper())
     bare = fitting.fit(data, {})
     quiet = replace(bare, reduced=np.random.default_rng(1).standard_normal(bare.reduced.shape))
-    monkeypatch.setattr("diagnosis.fits.laws.coupled.following", None)
+    monkeypatch.setattr("diagnosis.fits.laws.coupled.follow", None)
     assert coupled(bare, [quiet]) == []
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Problem, Values
-from diagnosis.fits.laws.specimen import following, path
+from diagnosis.fits.laws.specimen import SLOW, follow, path
 from diagnosis.fits.laws.starts import starts
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import remaining
@@ -95,10 +95,10 @@ def begun(fit: Fit) -> list[Fit]:
     """The fit with its last effect under further laws, where a fit of each starts best: those with the best starts."""
     way = path(fit.data.part)
     models = sorted({law.model for law in last(fit).laws[1:] if law.model}) if way is not None else []
-    known = tuple(item.tobytes() for item in way) if way is not None else ()
-    found = each(lambda model: following(model, *known), models)
-    followed = {item.model: item.parameters for item in found}
-    places = range(1, len(last(fit).laws))
+    known = follow(way, models) if way is not None else {}
+    followed = {model: item.parameters for model, item in known.items()}
+    tried = [law.model not in SLOW or law.model in known for law in last(fit).laws]
+    places = [place for place, wanted in enumerate(tried) if place and wanted]
     return sorted((begun_under(fit, place, followed) for place in places), key=cost)[:FITTED]
 
 

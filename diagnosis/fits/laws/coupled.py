@@ -8,7 +8,7 @@ from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import FARTHEST, FITTED, ROUGH, ROUNDS, cost, descended, fitted
-from diagnosis.fits.laws.specimen import as_specimen, following, path, within
+from diagnosis.fits.laws.specimen import as_specimen, follow, path, within
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import leaves
 from laboratories.effects.effect import Effect
@@ -50,11 +50,11 @@ def coupled(fit: Fit, first: list[Fit]) -> list[Fit]:
         if law.model and effect.name not in fit.names
     ]
     models = sorted({effect.laws[place].model for effect, place in places})
-    known = tuple(item.tobytes() for item in way)
-    found = {item.model: item for item in each(lambda model: following(model, *known), models)}
+    found = follow(way, models)
     starts = [
         (found[effect.laws[place].model].nrmse, beside(fit, effect, place, found[effect.laws[place].model]))
         for effect, place in places
+        if effect.laws[place].model in found
     ]
     tried = {item.names for item in first}
     starts = [item for item in starts if item[0] < NEARLY * left and tuple(item[1]) not in tried]

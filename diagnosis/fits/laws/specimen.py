@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 
 import numpy as np
 
 from common.plan.kinds import COLUMN
+from diagnosis.fits.threads import each
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
 from laboratories.effects.effect import Effect, Law, Parameter
 from models.registry import Array
 from models.specimens import fit as specimens
 from models.specimens.fit import SpecimenFit
+
+SLOW = ("layered",)  # models whose fit takes ten times as long as another's
+CLOSELY = 0.03  # of a force's rms: a model that leaves less has the specimen's loops
+BETTER = 0.8  # of what the best other model leaves: less of it is worth a model that takes long
 
 
 def path(part: Part) -> tuple[Array, Array] | None:
@@ -33,6 +38,23 @@ def path(part: Part) -> tuple[Array, Array] | None:
     if not (np.any(deformation[there]) and np.any(force[there])):
         return None
     return deformation[there], force[there]
+
+
+def follow(way: tuple[Array, Array], models: Iterable[str]) -> dict[str, SpecimenFit]:
+    """Models of specimens fitted to a path of deformation (m) and force (N), by name.
+
+    Those that take long are fitted where all others leave much of the force, and left out where they leave about as
+    much.
+    """
+    known = tuple(item.tobytes() for item in way)
+
+    def fits(names: Iterable[str]) -> list[SpecimenFit]:
+        return each(lambda model: following(model, *known), names)
+
+    found = fits(model for model in models if model not in SLOW)
+    least = min((item.nrmse for item in found), default=0.0)
+    slow = fits(model for model in models if model in SLOW and least > CLOSELY)
+    return {item.model: item for item in (*found, *(item for item in slow if item.nrmse < BETTER * least))}
 
 
 @lru_cache(maxsize=32)

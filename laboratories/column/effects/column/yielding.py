@@ -15,6 +15,8 @@ with yield displacement δ_y, hardening α and exponent n. The parameter `law` c
     8   the same with a trilinear skeleton
     9   pinched, with the corner of reloading at a share of the deformation that is left where the peak is unloaded
     10  the same with a trilinear skeleton
+    11  reinforced concrete: a section of layers of concrete and bars under an axial force, and an elastic shaft; R₀ of
+        the bars is the exponent, and what leans on the column makes the hardening negative
 
 Laws 5 to 10 may be stronger on one side, by `asymmetry`: concrete that cracks, or bars on one side only.
 
@@ -40,11 +42,24 @@ RELOADING = {
     "damage": 0.01,
     "asymmetry": 0.0,
 }
+LAYERS = {
+    "concrete": 5.0,
+    "axial": 0.4,
+    "strength": 0.5,
+    "spalling": 0.15,
+    "shaft": 0.6,
+    "focus": 2.0,
+}
 
 
 def share(name: str, null: float, least: float, says: str) -> Parameter:
     """A parameter of shape between `least` and 1 that only some of the laws have."""
     return Parameter(name, "", null, least, 1.0, (), says, shape=True)
+
+
+def of_layers(name: str, null: float, least: float, most: float, says: str) -> Parameter:
+    """A parameter of shape that only law 11 has."""
+    return Parameter(name, "", null, least, most, (), f"{says}, of law 11", shape=True)
 
 
 EFFECT = sets(
@@ -83,9 +98,9 @@ EFFECT = sets(
     },
     further={
         "law": which_law(
-            10.0,
+            11.0,
             "0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented, 4 trilinear, 5 pinched, 6 both, "
-            "7 and 8 as these with the corner by the peak, 9 and 10 by its rest",
+            "7 and 8 as these with the corner by the peak, 9 and 10 by its rest, 11 layers of concrete and bars",
         ),
         "unloading": Parameter(
             "unloading",
@@ -151,6 +166,26 @@ EFFECT = sets(
             says="strength of laws 5 to 10 on the positive side less that on the negative one, over their sum",
             shape=True,
         ),
+        "concrete": of_layers("concrete", 5.0, 1.0, 30.0, "stiffness of the concrete over that of the bars"),
+        "axial": of_layers("axial", 0.0, 0.0, 5.0, "axial force over that at which all bars yield"),
+        "concrete_strength": of_layers(
+            "strength",
+            0.5,
+            0.1,
+            3.0,
+            "strength of the concrete over its stiffness times the bars' yield strain",
+        ),
+        "spalling": of_layers(
+            "spalling",
+            0.0,
+            0.0,
+            1.0,
+            "share of their strength that outer layers lose per strain of yielding bars",
+        ),
+        "shaft": of_layers("shaft", 0.6, 0.05, 0.98, "share of the flexibility outside the section"),
+        "focus": of_layers(
+            "focus", 2.0, 0.1, 100.0, "strain in tension over that of yielding bars to which concrete unloads"
+        ),
     },
     laws=(
         Law("Bouc and Wen", {"hardening": 0.05, "exponent": 2.0}, "bouc_wen", {"exponent": "n"}),
@@ -173,6 +208,12 @@ EFFECT = sets(
         Law("pinched by the rest", {"hardening": 0.05, **RELOADING}, "pinched_by_rest"),
         Law(
             "pinched by the rest, trilinear", {"hardening": 0.05, **SKELETON, **RELOADING}, "pinched_by_rest"
+        ),
+        Law(
+            "layers of concrete and bars",
+            {"hardening": 0.0, "exponent": 16.0, **LAYERS},
+            "layered",
+            {"exponent": "sharpness"},
         ),
     ),
     says="the specimen yields",
