@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import pytest
 
 from common.plan.plan import Plan
 from common.roles import MASTER
@@ -12,7 +13,7 @@ from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import in_best_laws
-from diagnosis.fits.laws.specimen import path
+from diagnosis.fits.laws.specimen import follow, path
 from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
@@ -25,6 +26,7 @@ from laboratories.effects.effect import Effect
 from laboratories.table.kind import TABLE
 from loop import replay
 from models.registry import Array
+from models.specimens.fit import SpecimenFit, forces
 from models.system import System
 from tests.diagnosis.specimens import (
     HARDENING,
@@ -53,6 +55,36 @@ def test_a_pinched_law_with_damage_is_found_from_force_over_deformation() -> Non
     np.testing.assert_allclose(values["yield_displacement"], LIMIT, rtol=0.03)
     for name, true in Driven.TRUE.items():
         np.testing.assert_allclose(values[name], true, atol=0.05)
+    assert found.chi < 1.2 * found.reduced.size
+
+
+def test_a_model_that_takes_long_is_fitted_where_others_leave_much(monkeypatch: pytest.MonkeyPatch) -> None:
+    left = {"bilinear": 0.02, "clough": 0.2, "layered": 0.1}
+    asked: list[str] = []
+
+    def following(model: str, *_way: bytes) -> SpecimenFit:
+        asked.append(model)
+        return SpecimenFit(model, {}, left[model], {})
+
+    monkeypatch.setattr("diagnosis.fits.laws.specimen.following", following)
+    way = np.ones(2), np.ones(2)
+    assert follow(way, left).keys() == {"bilinear", "clough"}
+    assert sorted(asked) == ["bilinear", "clough"]
+    del left["bilinear"]
+    assert follow(way, left).keys() == {"clough", "layered"}
+    left["layered"] = 0.17  # about as much as the other one
+    assert follow(way, left).keys() == {"clough"}
+
+
+def test_reinforced_concrete_is_found_by_its_layers() -> None:
+    part = Driven()
+    true = {"axial": 0.5, "concrete": 4.0, "spalling": 0.1, "hardening": -0.01}
+    force = forces("layered", {"stiffness": K, "yield_displacement": LIMIT, **true}, part.inputs)
+    part.measured = (force + NOISE * np.random.default_rng(3).standard_normal(TICKS))[:, None]
+    (found,) = in_best_laws([first_law(part)])
+    values = found.values["column.yielding"]
+    assert CATALOGUE["column.yielding"].laws[int(values["law"])].name == "layers of concrete and bars"
+    np.testing.assert_allclose(values["axial"], 0.5, atol=0.1)
     assert found.chi < 1.2 * found.reduced.size
 
 

@@ -13,6 +13,7 @@ import pytest
 
 from models import specimens
 from models.registry import Array
+from models.specimens import layered
 
 K, DY = 12.5, 8.0  # kN/mm, mm: OpenSees's local iteration has an absolute tolerance
 CORNERS = np.array([0.0, 2.0, -1.0, 0.7, -3.0, 4.0, 3.5, 3.8, -0.2, 5.0, -5.0]) * DY
@@ -144,6 +145,62 @@ def test_pinched_by_rest_equals_the_hinge_of_ibarra_medina_and_krawinkler(ops: A
     expected = theirs(ops, points, "ModIMKPinching", K, *rules, *fate)
     found = ours("pinched_by_rest", points, hardening=hardening, pinch_force=force, pinch_displacement=place)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * K * DY)
+
+
+def section_moments(ops: Any, curvatures: Array, more: dict[str, float]) -> Array:
+    """Moments of the section of `layered` with OpenSees' materials, in units of the bars' yield stress and strain."""
+    ops.model("basic", "-ndm", 2, "-ndf", 3)
+    ops.uniaxialMaterial("Steel02", 1, 1.0, 1.0, layered.BARS_HARDEN, more["sharpness"], 0.925, 0.15)
+    strength, layers = more["strength"], 2 * layered.HALF
+    for tag, spalling in ((2, layered.IN_CORE * more["spalling"]), (3, more["spalling"])):
+        left, end = layered.LEFT * strength, 2.0 * strength + (1.0 - layered.LEFT) / spalling
+        ratio = (more["focus"] + left) / (more["focus"] + end)  # with which their common point is that focus
+        ops.uniaxialMaterial("Concrete02", tag, -strength, -2.0 * strength, -left, -end, ratio, 1e-9, 1.0)
+    ops.section("Fiber", 1)
+    for i in range(layers):
+        cover = i in (0, layers - 1)
+        ops.fiber((i + 0.5) / layers - 0.5, 0.0, more["concrete"] / layers, 3 if cover else 2)
+    for y in (-layered.BAR, 0.0, layered.BAR):
+        ops.fiber(y, 0.0, 0.5 * (1.0 - layered.MIDDLE) if y else layered.MIDDLE, 1)
+    for node, rotates in ((1, 1), (2, 0)):
+        ops.node(node, 0.0, 0.0)
+        ops.fix(node, rotates, 1, rotates)
+    ops.element("zeroLengthSection", 1, 1, 2, 1)
+    ops.timeSeries("Constant", 1)
+    ops.pattern("Plain", 1, 1)
+    ops.load(2, -more["axial"], 0.0, 0.0)
+    ops.test("NormUnbalance", 1e-8, 200)
+    ops.integrator("LoadControl", 1.0)
+    ops.analysis("Static", "-noWarnings")
+    assert ops.analyze(1) == 0
+    ops.loadConst("-time", 0.0)
+    ops.timeSeries("Linear", 2)
+    ops.pattern("Plain", 2, 2)
+    ops.load(2, 0.0, 0.0, 1.0)
+    result = []
+    for moved in np.diff(curvatures, prepend=0.0):
+        ops.integrator("DisplacementControl", 2, 3, float(moved))
+        assert ops.analyze(1) == 0
+        result.append(ops.getTime())
+    return np.array(result)
+
+
+@pytest.mark.parametrize(("axial", "focus", "rms"), [(0.4, 2.0, 0.015), (1.0, 2.0, 0.03), (0.1, 5.0, 0.005)])
+def test_layered_follows_a_fibre_section_of_concrete02_and_steel02(
+    ops: Any, axial: float, focus: float, rms: float
+) -> None:
+    # theirs reloads concrete along two lines in the place of one
+    more = {"concrete": 5.0, "axial": axial, "strength": 0.5, "spalling": 0.15, "focus": focus}
+    more |= {"sharpness": 18.0, "shaft": 0.6}
+    corners = np.array([0.0, 2.0, -2.0, 4.0, -4.0, 1.0, 8.0, -3.0, -1.0, -8.0, 8.0, 0.0]) * 2.0
+    curvatures = np.concatenate([np.linspace(a, b, 401)[1:] for a, b in pairwise(corners)])
+    params = layered.LayeredParams(K, DY, **more)
+    bending = layered.at_rest(np.array(params))[1]
+    expected = K * DY * layered.BAR / bending * section_moments(ops, curvatures, more)
+    points = (1.0 - params.shaft) * DY * layered.BAR * curvatures + params.shaft * expected / K
+    wrong = ours("layered", points, **more) - expected
+    assert np.sqrt(np.mean(wrong**2) / np.mean(expected**2)) < rms
+    assert np.max(np.abs(wrong)) < 0.05 * np.max(np.abs(expected))
 
 
 def test_trilinear_equals_a_sum_of_steel01(ops: Any) -> None:
