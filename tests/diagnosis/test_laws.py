@@ -67,13 +67,16 @@ def test_a_model_that_takes_long_is_fitted_where_others_leave_much(monkeypatch: 
         return SpecimenFit(model, {}, left[model], {})
 
     monkeypatch.setattr("diagnosis.fits.laws.specimen.following", following)
-    way = np.ones(2), np.ones(2)
-    assert follow(way, left).keys() == {"bilinear", "clough"}
+    part, way = Driven(), (np.ones(2), np.ones(2))
+    assert follow(part, way, left).keys() == {"bilinear", "clough"}
     assert sorted(asked) == ["bilinear", "clough"]
     del left["bilinear"]
-    assert follow(way, left).keys() == {"clough", "layered"}
+    assert follow(part, way, left).keys() == {"clough", "layered"}
+    assert follow(MadeSpecimen(), way, left).keys() == {
+        "clough"
+    }  # a laboratory, or what is no column by itself
     left["layered"] = 0.17  # about as much as the other one
-    assert follow(way, left).keys() == {"clough"}
+    assert follow(part, way, left).keys() == {"clough"}
 
 
 def test_reinforced_concrete_is_found_by_its_layers() -> None:

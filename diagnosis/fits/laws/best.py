@@ -95,7 +95,7 @@ def begun(fit: Fit) -> list[Fit]:
     """The fit with its last effect under further laws, where a fit of each starts best: those with the best starts."""
     way = path(fit.data.part)
     models = sorted({law.model for law in last(fit).laws[1:] if law.model}) if way is not None else []
-    known = follow(way, models) if way is not None else {}
+    known = follow(fit.data.part, way, models) if way is not None else {}
     followed = {model: item.parameters for model, item in known.items()}
     tried = [law.model not in SLOW or law.model in known for law in last(fit).laws]
     places = [place for place, wanted in enumerate(tried) if place and wanted]

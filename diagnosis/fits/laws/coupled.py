@@ -50,7 +50,7 @@ def coupled(fit: Fit, first: list[Fit]) -> list[Fit]:
         if law.model and effect.name not in fit.names
     ]
     models = sorted({effect.laws[place].model for effect, place in places})
-    found = follow(way, models)
+    found = follow(fit.data.part, way, models)
     starts = [
         (found[effect.laws[place].model].nrmse, beside(fit, effect, place, found[effect.laws[place].model]))
         for effect, place in places

@@ -40,11 +40,11 @@ def path(part: Part) -> tuple[Array, Array] | None:
     return deformation[there], force[there]
 
 
-def follow(way: tuple[Array, Array], models: Iterable[str]) -> dict[str, SpecimenFit]:
+def follow(part: Part, way: tuple[Array, Array], models: Iterable[str]) -> dict[str, SpecimenFit]:
     """Models of specimens fitted to a path of deformation (m) and force (N), by name.
 
     Those that take long are fitted where all others leave much of the force, and left out where they leave about as
-    much.
+    much. In a laboratory, which is replayed in short steps with its actuator, they would take minutes.
     """
     known = tuple(item.tobytes() for item in way)
 
@@ -53,8 +53,15 @@ def follow(way: tuple[Array, Array], models: Iterable[str]) -> dict[str, Specime
 
     found = fits(model for model in models if model not in SLOW)
     least = min((item.nrmse for item in found), default=0.0)
-    slow = fits(model for model in models if model in SLOW and least > CLOSELY)
+    slow = fits(model for model in models if model in SLOW and least > CLOSELY and by_itself(part))
     return {item.model: item for item in (*found, *(item for item in slow if item.nrmse < BETTER * least))}
+
+
+def by_itself(part: Part) -> bool:
+    """Whether a part is a column that is replayed from its measured deformation, in one recording or more."""
+    if isinstance(part, JoinedPart):
+        return all(by_itself(piece) for piece in part.pieces)
+    return isinstance(part, ColumnAlone)
 
 
 @lru_cache(maxsize=32)
