@@ -44,7 +44,7 @@ def follow(part: Part, way: tuple[Array, Array], models: Iterable[str]) -> dict[
     """Models of specimens fitted to a path of deformation (m) and force (N), by name.
 
     Those that take long are fitted where all others leave much of the force, and left out where they leave about as
-    much. In a laboratory, which is replayed in short steps with its actuator, they would take minutes.
+    much. A laboratory with its actuator is replayed in many short steps, so that they are not tried there.
     """
     known = tuple(item.tobytes() for item in way)
 
