@@ -130,6 +130,8 @@ def test_a_parameter_that_a_law_lacks_is_not_fitted() -> None:
             for place in (5, 7, 9)
         },
         **{place: {"yield_displacement", *Driven.TRUE} for place in (6, 8, 10)},
+        11: {"yield_displacement", "hardening", "exponent"}
+        | {"concrete", "axial", "strength", "spalling", "shaft", "focus"},
     }
 
 
