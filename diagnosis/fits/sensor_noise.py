@@ -132,6 +132,18 @@ def picked_up(raw: Array, interval: float) -> tuple[Array, list[tuple[pickup.Pic
     return waves, picked, kept
 
 
+def mains(fit: Fit) -> Array | None:
+    """What sensors pick up of the mains (ticks, signals), by the residuals that a fit leaves; None where nothing."""
+    data, interval = replace(fit.data, lines=None, spikes=None), fit.data.system.plan.test.interval
+    raw = data.residual(hypothesis.lay(data, fit.z, fit.values))
+    lines = np.zeros_like(raw)
+    for span in spans(data.part):
+        for place, column in enumerate(raw[span].T):
+            found = [one for one in pickup.pickups(column, interval) if pickup.of_mains(one.frequency)]
+            lines[span, place] = pickup.waves(column, found, interval)
+    return lines if lines.any() else None
+
+
 def related(data: Data, system: System) -> Crosswise | None:
     """A flexible model of averaged residuals from the part's inputs, None where too little was recorded for one."""
     columns = [data.averaged(values) for values in inputs(data.part, system).T]

@@ -40,8 +40,8 @@ def settled(fit: Fit, accepted: Data | None = None) -> Fit:
     """The fit under the noise that it leaves, which is that of its data.
 
     Where much of what it leaves follows from the inputs, the quiet part holds a gap as well as noise: the noise is
-    then taken to be white, of the level of the highest frequencies. `accepted` are the data with the noise beside
-    other effects, or none.
+    then taken to be white, of the level of the highest frequencies, beside the mains, which no machine follows.
+    `accepted` are the data with the noise beside other effects, or none.
     """
     if fit.data.part.exact:
         return fit
@@ -61,7 +61,7 @@ def settled(fit: Fit, accepted: Data | None = None) -> Fit:
         if not hidden(found, accepted):
             return replace(found, data=data) if found.data is not data else found
         data = sensor_noise.remodelled(fit)
-        data = replace(data, noise=(), lines=None, spikes=None, heard=heard(found))
+        data = replace(data, noise=(), lines=sensor_noise.mains(found), spikes=None, heard=heard(found))
     return under_white(found, data, fit.data)
 
 

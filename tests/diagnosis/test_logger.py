@@ -188,3 +188,17 @@ def test_the_error_of_an_interpolated_ground_motion_is_known(cases: Cases) -> No
     error = float(np.sqrt(np.mean((again - whole.signals["ground_acceleration"]) ** 2)))
     assert part.blur == 0.0
     assert part.interpolated(1024.0) == pytest.approx(error, rel=0.02)
+
+
+def test_a_hum_is_no_gap_although_something_unknown_moves_a_reading(cases: Cases) -> None:
+    whole = cases.record({"column.yielding": {"yield_displacement": 1e-3, "hardening": 0.1}}, duration=8.0)
+    hum = 400.0 * np.sin(2.0 * np.pi * 50.0 * whole.time + 0.4)
+    humming = replace(whole, signals=whole.signals | {"column_force": whole.signals["column_force"] + hum})
+    fit = fitting.fit(residuals.prepare(lab_a(humming), humming), {})
+    lines = sensor_noise.mains(fit)
+    assert lines is not None
+    place = fit.data.part.signals.index("column_force")
+    assert np.std(lines[:, place] - hum) < 0.05 * np.std(hum)
+    assert not lines[:, 1 - place].any()
+    assert settling.settled(fit).data.lines is not None
+    assert sensor_noise.mains(fitting.fit(residuals.prepare(lab_a(whole), whole), {})) is None
