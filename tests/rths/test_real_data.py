@@ -85,7 +85,9 @@ def test_a_fibre_column_is_found_to_yield_and_to_soften_with_its_largest_drift(
     first = report["which"][0]
     assert first["effects"] == ["column.yielding"]
     law = first["parameters"]["column.yielding"]["law"]["value"]
-    assert 5 <= law <= 10  # reloading aims at the largest drift seen, and so softens with it
+    assert (
+        5 <= law <= 11
+    )  # reloading softens with the largest drift seen: towards the peak, or as its layers crack
     assert report["status"] == "partly_explained"
     assert report["how_far"]["after"] < 0.1 * report["how_far"]["before"]
 
