@@ -1,4 +1,4 @@
-"""Intervals of what a fit moved: curvature, correlated and systematic errors of the model, and alternatives.
+"""Intervals of what a fit moved: curvature, correlated errors of the model, and alternatives that are as probable.
 
 The parameters of a verdict are fitted once more to all rows of a recording. A selection of effects must not see the
 withheld ones; once it is made, they make the parameters surer, and so no interval rests on a part of the motion only.
@@ -21,11 +21,9 @@ from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Free, Problem
 from diagnosis.fits.residuals import BLOCK
-from diagnosis.fits.unexplained import gaps
 from models.registry import Array
 
 COVERED = 0.95  # probability with which an interval holds the true parameter
-NORMAL = float(norm.ppf(0.5 * (1.0 + COVERED)))  # standard deviations of such an interval's ends
 STEPS = 8  # of the fit to all rows, which begins close to its end
 # Largest share of what is known of a direction that a block may hold for itself. The others then know a tenth: less
 # would divide by almost nothing.
@@ -134,11 +132,8 @@ def intervals(verdict: PartVerdict) -> dict[str, dict[str, Interval]]:
     place = problem.place(fit.values, fit.z)
     chances = list(zip(search.alternatives, odds(search), strict=True))
     result: dict[str, dict[str, Interval]] = {}
-    left = systematic(fit)
     for i, item in enumerate(problem.frees, start=fit.z.size):
-        half = math.hypot(
-            sure.half(i), NORMAL * math.sqrt(left * max(sure.noise[i, i], 0.0)), formulas(fit, item)
-        )
+        half = math.hypot(sure.half(i), formulas(fit, item))
         shifts = ((moved_by(search.chosen, other, item), chance) for other, chance in chances)
         others = [(shift, chance) for shift, chance in shifts if shift is not None]
         ends = (place[i] + end for end in mixed(half, others))
@@ -153,17 +148,6 @@ def intervals(verdict: PartVerdict) -> dict[str, dict[str, Interval]]:
             not low[i] + edge < item.inward(value) < high[i] - edge,
         )
     return result
-
-
-def systematic(fit: Fit) -> float:
-    """Σ (residual/σ)² of what is systematic in the residuals that a fit leaves, as it weighted signals.
-
-    A law that differs from the specimen's leaves a part of the difference and moves its parameters by the rest, of
-    which nothing is known: it is taken to be as large, and to have the shape of each parameter in turn.
-    """
-    each = gaps(fit, fit.data.group)
-    shares = [item.ratio * weight for item, weight in zip(each, fitting.weights(fit), strict=True)]
-    return float(np.sum(np.square(shares))) * fit.data.groups * fit.data.group
 
 
 def formulas(fit: Fit, item: Free) -> float:
