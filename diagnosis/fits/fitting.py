@@ -139,7 +139,7 @@ def moved(data: Data, fit: Fit, steps: int, slopes: Array | None, weights: Array
 
 
 def everywhere(fit: Fit) -> float:
-    """What a fit costs with the groups that it has seen, beyond noise.
+    """What a fit costs beyond noise on all groups, those included that it has seen.
 
     Fits that have not reached their end are ranked by it: an effect may show in few seconds, all of which they see,
     and until they have found its size they may be worse on the others.

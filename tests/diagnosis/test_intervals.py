@@ -9,10 +9,21 @@ import numpy as np
 import pytest
 from scipy.stats import norm, t
 
-from diagnosis.findings.certainty.intervals import Spread, covariance, formulas, mixed, refined, spread
+from diagnosis.findings.certainty.intervals import (
+    Spread,
+    between_formulas,
+    covariance,
+    intervals,
+    mixed,
+    refined,
+    spread,
+)
+from diagnosis.findings.verdict import judge
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import search
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_b
 
@@ -96,6 +107,15 @@ def test_a_level_that_a_reading_does_not_go_beyond_is_as_wide_as_formulas_differ
     assert tanh * np.tanh((small / tanh) ** 1.5) ** (1.0 / 1.5) == pytest.approx(
         small / (1.0 + (small / limit) ** 3.0) ** (1.0 / 3.0), rel=1e-6
     )
-    assert formulas(fit, free) == pytest.approx(np.log(limit / tanh), rel=0.1)
+    assert between_formulas(fit, free) == pytest.approx(np.log(limit / tanh), rel=0.1)
     clipped = fitting.at(data, {name: {"limit": 20.0, "sharpness": 3.0}}, fit.z)
-    assert formulas(clipped, free) == 0.0
+    assert between_formulas(clipped, free) == 0.0
+
+
+def test_the_interval_of_an_unreached_level_holds_that_of_another_formula(cases: Cases) -> None:
+    name = "sensor.damper_force.saturation"
+    whole = cases.record({name: {"limit": 60.0, "sharpness": 3.0}}, duration=8.0)
+    found = search(residuals.prepare(lab_b(whole), whole), Scales(whole, 0.0))
+    level = intervals(judge(found))[name]["limit"]
+    assert level.value == pytest.approx(60.0, rel=0.05)
+    assert level.low < 60.0 / 1.5 ** (1.0 / 3.0)

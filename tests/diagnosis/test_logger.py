@@ -202,3 +202,18 @@ def test_a_hum_is_no_gap_although_something_unknown_moves_a_reading(cases: Cases
     assert not lines[:, 1 - place].any()
     assert settling.settled(fit).data.lines is not None
     assert sensor_noise.mains(fitting.fit(residuals.prepare(lab_a(whole), whole), {})) is None
+
+
+def test_coloured_noise_larger_than_the_steps_of_a_reading_is_taken_for_noise(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    part = lab_b(whole)
+    system, place = whole.systems[part.role], part.signals.index("table_acceleration")
+    step, smooth = 0.02, signal.butter(2, 20.0, fs=500.0, output="sos")
+    noise = signal.sosfilt(smooth, np.random.default_rng(5).standard_normal(4096 + len(part.measured)))[4096:]
+    measured = part.predict(system)
+    measured[:, place] = step * np.round((measured[:, place] + 0.06 * noise / np.std(noise)) / step)
+    data = residuals.prepare(part.replaced(measured=measured), whole, {"table_acceleration": step})
+    assert step > residuals.STEPPING * data.white[place]  # at the highest frequencies steps stand out
+    model = sensor_noise.modelled(data, system).noise[place]
+    assert model.density is not None
+    assert model.rms == pytest.approx(0.06, rel=0.2)

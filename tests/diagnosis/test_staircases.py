@@ -9,14 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis.findings.sensors import readings, staircases
+from diagnosis.diagnose import examine
 from diagnosis.findings.sensors.staircases import staircase
-from diagnosis.fits import residuals
-from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import search
-from diagnosis.recorded.record import Record
 from models.registry import Array
-from tests.diagnosis.cases import Cases, lab_b
+from tests.diagnosis.cases import Cases
 
 
 def motion(amplitude: float) -> Array:
@@ -62,16 +58,8 @@ def test_the_fault_of_a_sensor_is_told_behind_a_loggers_noise(cases: Cases, faul
         if fault == "quantization"
         else true + generator.normal(0.0, rms, true.size)
     )
-    values = values + generator.normal(0.0, 1e-6, true.size)
+    values = values + generator.normal(0.0, 3e-5, true.size)
     logged = replace(whole, signals=whole.signals | {name: values})
-    found = told(logged)
+    found = examine(logged).readings
     assert [item.effect for item in found] == [f"sensor.{name}.{fault}"]
     assert found[0].value == pytest.approx(step if fault == "quantization" else rms, rel=0.05)
-
-
-def told(record: Record) -> list[readings.SensorFinding]:
-    """Findings on the sensors of the slave's laboratory."""
-    data = residuals.prepare(lab_b(record), record, {})
-    searched = search(data, Scales(record, 0.0))
-    found = readings.findings(record, readings.levels([searched.data]), {}, {})
-    return staircases.told(found, [], [searched], record)

@@ -12,11 +12,12 @@ from diagnosis.diagnose import doubted, examine
 from diagnosis.findings import where
 from diagnosis.findings.certainty.trust import share_named
 from diagnosis.findings.report import status_of
-from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge
+from diagnosis.findings.verdict import PartVerdict, allowed, artefact, at_end, farthest, judge
 from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import TOLERANCES
-from diagnosis.fits.search import Search
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import Search, search
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import PartOfGap
 from models.registry import Array
@@ -155,3 +156,18 @@ def test_an_unknown_effect_in_one_part_does_not_hide_the_name_of_another(
     assert (
         status_of(replace(found, verdicts=[item for item in strange if not item.effects])) == "unknown_effect"
     )
+
+
+def test_an_effect_whose_size_lies_at_the_end_of_its_range_explains_in_part_only(cases: Cases) -> None:
+    whole = cases.record({"actuator.gain": {"factor": 0.9}}, duration=8.0)
+    found = search(residuals.prepare(lab_a(whole), whole), Scales(whole, 0.0))
+    assert found.chosen.names == ("actuator.gain",)
+    assert at_end(found.chosen) == ()
+    assert judge(found).outcome == "explained"
+    size = found.chosen.values["actuator.gain"]["factor"]
+    effect = found.data.catalogue["actuator.gain"]
+    narrow = replace(effect, parameters=(replace(effect.parameters[0], least=size),))
+    data = replace(found.data, catalogue={**found.data.catalogue, "actuator.gain": narrow})
+    limited = replace(found, data=data, chosen=replace(found.chosen, data=data))
+    assert at_end(limited.chosen) == ("actuator.gain",)
+    assert judge(limited).outcome == "partly"

@@ -133,7 +133,7 @@ def intervals(verdict: PartVerdict) -> dict[str, dict[str, Interval]]:
     chances = list(zip(search.alternatives, odds(search), strict=True))
     result: dict[str, dict[str, Interval]] = {}
     for i, item in enumerate(problem.frees, start=fit.z.size):
-        half = math.hypot(sure.half(i), formulas(fit, item))
+        half = math.hypot(sure.half(i), between_formulas(fit, item))
         shifts = ((moved_by(search.chosen, other, item), chance) for other, chance in chances)
         others = [(shift, chance) for shift, chance in shifts if shift is not None]
         ends = (place[i] + end for end in mixed(half, others))
@@ -150,7 +150,7 @@ def intervals(verdict: PartVerdict) -> dict[str, dict[str, Interval]]:
     return result
 
 
-def formulas(fit: Fit, item: Free) -> float:
+def between_formulas(fit: Fit, item: Free) -> float:
     """How far, as a fit moves it, another formula may put a level that the signal did not go beyond; 0 for others.
 
     By value/(1 + |value/L|ⁿ)^(1/n) a reading is smaller by |value/L|ⁿ/n near zero, by L'·tanh(|value/L'|ᵐ)^(1/m) by
