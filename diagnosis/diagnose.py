@@ -16,6 +16,7 @@ from common.terminal.telling import Tell, untold
 from diagnosis.findings import logger, report, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors import readings, staircases
+from diagnosis.findings.sensors.staircases import Stairs
 from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
@@ -101,26 +102,28 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     rounded = readings.steps(record)
     steps = readings.resolutions(record, rounded) | logger.interpolated(parts)
     datas, verdicts = [], []
+    hidden: dict[str, Stairs] = {}
     # s, delay that a logger added to all channels, and to the forces of a building; None without a logger.
     late = None if record.stated is None else logger.common_delay(parts, record, steps)
     for number, given in enumerate(parts, 1):
         part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
         tell(part.name, number, len(parts))
-        datas.append(residuals.prepare(part, record, steps))
-        scales = Scales(record, part.shift() if isinstance(part, Ground) else 0.0)
-        whole = joined(part, further, datas[-1].group)
-        data = datas[-1] if whole is part else residuals.prepare(whole, record, steps)
-        verdicts.append(seen_in(datas[-1], judged(data, scales, other_view(part, record, steps))))
+        data, verdict = seen(part, further, record, steps)
+        if anew := staircases.hidden(verdict.search, record):
+            hidden, steps = hidden | anew, steps | {name: stairs.step for name, stairs in anew.items()}
+            data, verdict = seen(part, further, record, steps)
+        datas.append(data)
+        verdicts.append(verdict)
         found = verdicts[-1].search
         if isinstance(found.data.part, LoggedBuilding):
             late = found.data.part.late(found.chosen.z)
     searches = [item.search for item in verdicts]
     final, held = [item.data for item in searches], readings.held(record, steps)
     loud, sharp = (readings.levels(final, list(map(of, searches))) for of in (heard, sharpest))
-    noisy, named = (
-        readings.findings(record, levels, rounded, steps, logged=late is not None) for levels in (loud, sharp)
-    )
-    sensors = staircases.told(named, noisy, searches, record)
+    sensors = [
+        *readings.findings(record, sharp, rounded, steps, logged=late is not None),
+        *staircases.findings(hidden, record, logged=late is not None),
+    ]
     result = Diagnosis(
         record,
         verdicts,
@@ -140,6 +143,17 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         [law for verdict in verdicts if verdict.outcome in UNNAMED for law in learn(verdict.search.chosen)],
     )
     return replace(result, warnings=[*result.warnings, *logger.remarks(result)])
+
+
+def seen(
+    part: Part, further: Sequence[Part], record: Record, steps: Mapping[str, float]
+) -> tuple[Data, PartVerdict]:
+    """Residuals of a part and the verdict on it, which the same part of other recordings decides as well."""
+    scales = Scales(record, part.shift() if isinstance(part, Ground) else 0.0)
+    data = residuals.prepare(part, record, steps)
+    whole = joined(part, further, data.group)
+    joint = data if whole is part else residuals.prepare(whole, record, steps)
+    return data, seen_in(data, judged(joint, scales, other_view(part, record, steps)))
 
 
 def other_view(part: Part, record: Record, steps: Mapping[str, float]) -> Data | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,8 +23,8 @@ def motion(amplitude: float) -> Array:
 
 @given(
     step=st.floats(1e-7, 1e2),
-    levels=st.floats(2.0, 60.0),
-    noise=st.floats(0.0, 0.15),
+    levels=st.floats(3.0, 60.0),
+    noise=st.floats(0.0, 0.3),
     seed=st.integers(0, 99),
 )
 def test_steps_below_noise_are_found_with_their_size(
@@ -35,7 +36,7 @@ def test_steps_below_noise_are_found_with_their_size(
     )
     found = staircase(predicted, read - predicted)
     assert found is not None
-    assert found.step == pytest.approx(step, rel=2e-3)
+    assert found.step == pytest.approx(step, rel=5e-3)
     assert found.low <= step <= found.high
 
 
@@ -46,9 +47,18 @@ def test_noise_is_no_staircase(levels: float, seed: int) -> None:
     assert staircase(0.0 * predicted, 0.0 * predicted) is None
 
 
+@pytest.mark.parametrize(
+    "bend", [np.sign, np.square, lambda x: x**3, lambda x: np.clip(x, -0.3, 0.3), np.sin]
+)
+def test_a_bent_scale_is_no_staircase(bend: Callable[[Array], Array]) -> None:
+    predicted = motion(1.0)
+    assert staircase(predicted, bend(predicted)) is None
+    assert staircase(predicted, -predicted) is None  # a dead reading
+
+
+@pytest.mark.parametrize("rms", [5e-5, 2e-4])
 @pytest.mark.parametrize("fault", ["noise", "quantization"])
-def test_the_fault_of_a_sensor_is_told_behind_a_loggers_noise(cases: Cases, fault: str) -> None:
-    rms = 2e-4
+def test_the_fault_of_a_sensor_is_told_behind_a_loggers_noise(cases: Cases, fault: str, rms: float) -> None:
     whole = cases.record(duration=8.0)
     name, generator = "table_displacement", np.random.default_rng(3)
     true = whole.signals[name]
@@ -58,8 +68,10 @@ def test_the_fault_of_a_sensor_is_told_behind_a_loggers_noise(cases: Cases, faul
         if fault == "quantization"
         else true + generator.normal(0.0, rms, true.size)
     )
-    values = values + generator.normal(0.0, 3e-5, true.size)
+    values = values + generator.normal(0.0, 0.2 * rms, true.size)
     logged = replace(whole, signals=whole.signals | {name: values})
-    found = examine(logged).readings
+    result = examine(logged)
+    found = result.readings
     assert [item.effect for item in found] == [f"sensor.{name}.{fault}"]
+    assert {item.outcome for item in result.verdicts} <= {"none", "tolerances"}
     assert found[0].value == pytest.approx(step if fault == "quantization" else rms, rel=0.05)

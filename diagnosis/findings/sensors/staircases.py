@@ -6,7 +6,7 @@ A reading that was rounded before a logger added noise has no levels any more, b
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +21,10 @@ from models.registry import Array
 LEAST, MOST = 0.5, 1.3
 # Share of a step by which the outermost level of two steps tried may differ, and most steps that are tried.
 APART, TRIED = 0.1, 4000
-HALF = 0.5  # share of the noise that steps must explain; those of another size explain less than nothing
+# Share of the noise that steps must explain: what a prediction errs blurs them, and those of another size explain less
+# than nothing.
+SHARE = 0.25
+COARSEST = 0.5  # of the largest reading, above which steps look like a bend of the scale
 
 
 @dataclass(frozen=True)
@@ -33,41 +36,40 @@ class Stairs:
     high: float
 
 
-def told(
-    named: Sequence[readings.SensorFinding],
-    noisy: Sequence[readings.SensorFinding],
-    searches: Sequence[Search],
-    record: Record,
-) -> list[readings.SensorFinding]:
-    """The findings `named`, with steps in the place of noise that follows from steps of the prediction.
+def hidden(search: Search, record: Record) -> dict[str, Stairs]:
+    """Steps of a part's readings that noise hides, by signal: of readings that err far more than their sensors' noise.
 
-    `noisy` are findings of noise of any colour, which what no effect explains may be as well.
+    Both what the effects found predict and what the plan predicts inside its tolerances may show them.
     """
-    noises = {item.effect: item for item in (*named, *noisy) if item.effect.endswith(".noise")}
-    steps = {}
-    for search in searches:
-        rows = [
-            (
-                place,
-                readings.effect_on(record, name, "noise"),
-                readings.effect_on(record, name, "quantization"),
-            )
-            for place, name in enumerate(search.data.part.signals)
-            if name in readings.read_by(record)
-        ]
-        rows = [row for row in rows if row[1] in noises]
-        if not rows:
-            continue
-        system = hypothesis.lay(search.data, search.chosen.z, search.chosen.values)
-        predicted, residual = search.data.part.predict(system), search.data.residual(system)
-        for place, noise, quantization in rows:
-            there = search.data.there[:, place] & np.isfinite(predicted[:, place])
+    read, data, found = readings.read_by(record), search.data, {}
+    planned = {name: level for lab in record.labs for name, level in lab.noise.items()}
+    for fit in (search.commissioned, search.chosen):
+        system = hypothesis.lay(data, fit.z, fit.values)
+        predicted, residual = data.part.predict(system), data.residual(system)
+        for place, name in enumerate(data.part.signals):
+            there = data.there[:, place] & np.isfinite(predicted[:, place])
+            if name not in read or name in found or not there.any():
+                continue
+            usual = max(planned.get(name, 0.0), float(data.rounded[place]))
+            if float(np.std(residual[there, place])) < readings.LOUDER * usual:
+                continue
             if stairs := staircase(predicted[there, place], residual[there, place]):
-                bounds = (stairs.low, stairs.high)
-                ratio = noises[noise].ratio
-                steps[noise] = readings.SensorFinding(quantization, "step", stairs.step, bounds, ratio)
-    kept = [item for item in named if item.effect not in steps]
-    return [*kept, *steps.values()]
+                found[name] = stairs
+    return found
+
+
+def findings(hidden: Mapping[str, Stairs], record: Record, *, logged: bool) -> list[readings.SensorFinding]:
+    """Sensors that round to `hidden` steps; of a recording that was logged (`logged`), its converter made fine ones."""
+    planned = {name: level for lab in record.labs for name, level in lab.noise.items()}
+    result = []
+    for name, stairs in hidden.items():
+        noise, usual = stairs.step / math.sqrt(12.0), planned.get(name, 0.0)
+        if logged and noise < readings.CONVERTER * float(np.max(np.abs(record.signals[name]))):
+            continue
+        effect, bounds = readings.effect_on(record, name, "quantization"), (stairs.low, stairs.high)
+        ratio = noise / usual if usual > 0.0 else 0.0
+        result.append(readings.SensorFinding(effect, "step", stairs.step, bounds, ratio))
+    return result
 
 
 def staircase(predicted: Array, residual: Array) -> Stairs | None:
@@ -81,11 +83,12 @@ def staircase(predicted: Array, residual: Array) -> Stairs | None:
         return None
     count = min(TRIED, 16 + math.ceil(math.log(MOST / LEAST) * reach / (LEAST * usual * APART)))
     steps = usual * np.geomspace(LEAST, MOST, count)
+    steps = steps[steps < COARSEST * reach]
     left = np.array([np.var(residual - error(predicted, step)) for step in steps])
-    best = int(np.argmin(left))
-    if left[best] > (1.0 - HALF) * np.var(residual):
+    best = int(np.argmin(left)) if steps.size else 0
+    if not steps.size or left[best] > (1.0 - SHARE) * np.var(residual):
         return None
-    near = np.linspace(steps[max(best - 1, 0)], steps[min(best + 1, count - 1)], count)
+    near = np.linspace(steps[max(best - 1, 0)], steps[min(best + 1, steps.size - 1)], count)
     left = np.array([np.var(residual - error(predicted, step)) for step in near])
     step = float(near[np.argmin(left)])
     # the place of the outermost level is known as well as the reading there
