@@ -20,6 +20,7 @@ HARD = (0.5, 5.0, 50.0)  # times the largest force over the largest stroke: an e
 USUAL_RATE = 0.05  # m/s, of a part whose motion was not recorded or is none
 FARTHEST = 4.0  # times a usual size where a search still begins
 LIMITS = (0.25, 0.4, 0.55, 0.7, 0.85, 0.95)  # of what is reached: where a limit is looked for
+SWALLOWED = (0.3, 1.0)  # of what is reached: a play that takes a large part of a small motion
 
 
 class Scales:
@@ -66,7 +67,7 @@ class Scales:
         if len(strength) != 1:
             return
         (parameter,) = strength
-        for size in self.sizes(effect, parameter):
+        for size in (*self.sizes(effect, parameter), *self.swallowing(effect, parameter)):
             for form, shape in self.forms(effect):
                 yield form, {**shape, parameter.name: size}
 
@@ -93,7 +94,7 @@ class Scales:
         return (self.rate(motion) if motion and self._record.has(motion) else 0.0) or USUAL_RATE
 
     def sizes(self, effect: Effect, parameter: Parameter) -> list[float]:
-        """Sizes of the parameter that counts."""
+        """Usual sizes of the parameter that counts."""
         if effect.shifts_time and self._shift != 0.0:
             return [self._shift]
         if starts := effect.starts(self._plan(effect)):
@@ -115,6 +116,13 @@ class Scales:
         if np.isfinite(parameter.null) and len(sizes) > 2:
             sizes = sizes[1:-1:2] if len(sizes) > 4 else [sizes[1], sizes[-1]]
         return [min(max(size, parameter.least), parameter.most) for size in sizes]
+
+    def swallowing(self, effect: Effect, parameter: Parameter) -> list[float]:
+        """Widths of a play that take a large part of the motion, none where the parameter is no such width."""
+        reached = self.reached(self.signal(effect, parameter.unit), parameter.unit)
+        if not parameter.swallows or not reached:
+            return []
+        return [min(share * reached, parameter.most) for share in SWALLOWED]
 
     def _plan(self, effect: Effect) -> Plan:
         """The plan as the role sees it whose laboratory has an effect's site."""

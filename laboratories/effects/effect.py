@@ -34,6 +34,9 @@ class Parameter:
     bends_by: str = (
         ""  # of a level that a signal does not exceed: the shape that says how suddenly it bends there
     )
+    swallows: bool = (
+        False  # whether it is a width of a motion that comes to nothing: a search goes up to what is reached
+    )
     smoothing: float = (
         0.0  # for a velocity that smooths a law near rest: its share of the peak velocity in a search
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -22,7 +20,7 @@ from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.nuisances import Nuisance
 from diagnosis.recorded.parts import ColumnAlone, Part
 from laboratories.effects import CATALOGUE
-from laboratories.effects.effect import Effect
+from laboratories.effects.effect import Effect, Parameter
 from laboratories.table.kind import TABLE
 from loop import replay
 from models.registry import Array
@@ -165,9 +163,8 @@ class Sizes(Scales):
     def __init__(self) -> None:
         pass
 
-    def starts(self, effect: Effect) -> Iterator[tuple[tuple[float, ...], dict[str, float]]]:
-        (strength,) = (item for item in effect.parameters if not item.shape)
-        yield from (((), effect.values({strength.name: size})) for size in strength.sizes)
+    def sizes(self, effect: Effect, parameter: Parameter) -> list[float]:
+        return list(parameter.sizes)
 
 
 def test_a_law_behind_the_first_starts_on_the_side_that_promises() -> None:

@@ -42,19 +42,19 @@ def starts(
 def gridded(fit: Fit, effect: Effect, place: int, scales: Scales) -> Iterator[dict[str, float]]:
     """Parameters from which a law may start where nothing is known of its effect, from weak to strong."""
     (strength,) = (item for item in effect.parameters if not item.shape)
-    sizes = [values[strength.name] for _, values in scales.starts(effect)]
+    sizes = scales.sizes(effect, strength)
     if not sizes or min(sizes) <= 0.0:
         return
     for size in np.geomspace(WEAKER * min(sizes), max(sizes), GRID).tolist():
         base = effect.under(place, effect.values({strength.name: within(strength, size)}))
-        for shape in shapes(fit, effect, place):
+        for shape in shapes(fit, effect, place, finer=()):
             yield base | shape
 
 
-def shapes(fit: Fit, effect: Effect, place: int) -> list[dict[str, float]]:
-    """The first shape of a law at some sizes: a length that only some laws have follows what the column reaches.
+def shapes(fit: Fit, effect: Effect, place: int, finer: tuple[float, ...] = FINER) -> list[dict[str, float]]:
+    """The first shape of a law at its sizes, and at these times `finer`.
 
-    A second length of the law stays in proportion to it.
+    A length that only some laws have follows what the column reaches. A second length of the law stays in proportion.
     """
     law = effect.laws[place]
     shape = next((item for item in effect.every if item.name in law.shapes and item.sizes), None)
@@ -64,7 +64,7 @@ def shapes(fit: Fit, effect: Effect, place: int) -> list[dict[str, float]]:
     if shape in effect.further and way is not None:
         sizes = {share * float(np.max(np.abs(way[0]))) for share in REACHED}
     else:
-        sizes = {share * size for share in (*FINER, 1.0) for size in shape.sizes}
+        sizes = {share * size for share in (*finer, 1.0) for size in shape.sizes}
     lengths = [item for item in effect.further if item.name in law.shapes and item.unit == shape.unit == "m"]
     scaled = {item: law.shapes[item.name] / law.shapes[shape.name] for item in lengths if item is not shape}
     return [

@@ -33,6 +33,7 @@ EFFECT = sets(
             most=0.005,
             sizes=(2e-05, 6e-05, 0.0002, 0.0006),
             says="whole play",
+            swallows=True,
         ),
     },
     further={

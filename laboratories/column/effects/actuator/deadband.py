@@ -27,6 +27,7 @@ EFFECT = sets(
             most=0.005,
             sizes=(5e-05, 0.00015, 0.0004, 0.001),
             says="whole band of the error",
+            swallows=True,
         ),
     },
     further={"deadband_law": which_law(1.0, "0 with sharp edges, 1 with edges that leak")},

@@ -36,6 +36,7 @@ EFFECT = sets(
             most=0.2,
             sizes=(2e-05, 6e-05, 0.0002, 0.0006),
             says="whole gap",
+            swallows=True,
         ),
     },
     further={

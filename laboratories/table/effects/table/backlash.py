@@ -32,6 +32,7 @@ EFFECT = sets(
             most=0.02,
             sizes=(3e-05, 0.0001, 0.0004, 0.0015),
             says="whole play",
+            swallows=True,
         ),
     },
     further={
