@@ -65,12 +65,15 @@ def diagnose(
     """
     # The matrices are small, so that several BLAS threads would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = {role: examine(record, tell, more.get(role, ())) for role, record in records.items()}
+        found = {
+            role: examine(logger.clocked(record), tell, [*map(logger.clocked, more.get(role, ()))])
+            for role, record in records.items()
+        }
         systems = {role: item.systems(noisy=False)[role] for role, item in found.items()}
         return {
             role: report.build(
                 replace(item, record=among(item.record, systems)),
-                [among(other, systems) for other in validation.get(role, ())],
+                [among(logger.clocked(other), systems) for other in validation.get(role, ())],
                 tell,
                 require,
             )

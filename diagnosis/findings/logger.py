@@ -1,4 +1,4 @@
-"""The data logger between an imported recording and its laboratories: a delay and an interpolation of all channels."""
+"""The data logger between an imported recording and its laboratories: its clock, delay and interpolation."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.sensors import readings
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
+from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.parts import ALIKE, LATE, LaboratoryPart, Part
-from diagnosis.recorded.record import Record
+from diagnosis.recorded.record import LEAST_TICKS, Record
+from diagnosis.signals import clock
 
 # Share of a reading's rms that a nominal model leaves, from which on an effect is at work: noise, a hum of 1 % of the
 # peak and a converter together leave up to 4 %.
@@ -31,18 +34,48 @@ def common_delay(parts: Sequence[Part], record: Record, steps: Mapping[str, floa
     A filter or a logger delays all of its channels; an effect delays those of one machine. A laboratory that its
     nominal model misses by far tells nothing of the logger, as long as another one does.
     """
-    labs = [part.logged(0.0, LATE) for part in parts if isinstance(part, LaboratoryPart)]
-    if len(labs) < 2:
+    fits = nominal(parts, record, steps)
+    if len(fits) < 2:
         return 0.0
-    fits = [fitting.fit(residuals.prepare(lab, record, steps), {}) for lab in labs]
-    near = [missed(fit) < SPOILT for fit in fits]
+    near = [missed(fit) < SPOILT for _, fit in fits]
     found = [
         delay
-        for lab, fit, yes in zip(labs, fits, near, strict=True)
+        for (lab, fit), yes in zip(fits, near, strict=True)
         if yes or not any(near)
         for delay in lab.late(fit.z)
     ]
     return max(0.0, min(found, default=0.0))
+
+
+def clocked(record: Record) -> Record:
+    """An imported record with its readings on the clock of the commands.
+
+    That the logger's clock is fast or slow is told by all readings of several laboratories alike.
+    """
+    if record.stated is None or record.static or record.ticks < LEAST_TICKS:
+        return record
+    said = [
+        rates(lab, fit) for lab, fit in nominal(parts_of(record), record, readings.resolutions(record, {}))
+    ]
+    fast = clock.common(said)
+    return record.put_right(fast) if fast != 0.0 else record
+
+
+def nominal(
+    parts: Sequence[Part], record: Record, steps: Mapping[str, float]
+) -> list[tuple[LaboratoryPart, Fit]]:
+    """Laboratories behind a logger of any delay, each with the fit of its nominal model."""
+    labs = [part.logged(0.0, LATE) for part in parts if isinstance(part, LaboratoryPart)]
+    return [(lab, fitting.fit(residuals.prepare(lab, record, steps), {})) for lab in labs]
+
+
+def rates(lab: LaboratoryPart, fit: Fit) -> list[clock.Rate]:
+    """How fast the clock of each reading of a laboratory runs."""
+    predicted = lab.predict(hypothesis.lay(fit.data, fit.z, fit.values))
+    interval = fit.data.system.plan.test.interval
+    columns = zip(lab.measured.T, predicted.T, lab.present.T, strict=True)
+    found = [clock.rate(*column, interval) for column in columns]
+    return [one for one in found if one is not None]
 
 
 def missed(fit: Fit) -> float:
@@ -56,11 +89,19 @@ def missed(fit: Fit) -> float:
 
 
 def remarks(found: Diagnosis) -> list[str]:
-    """A sentence where all readings of an import are late alike."""
+    """Sentences where all readings of an import are late alike, and where their clock was fast or slow."""
     late = min((delay for delay, _ in found.logger.values()), default=0.0)
+    fast = found.record.fast
+    said = []
+    if fast != 0.0:
+        said.append(
+            f"The clock of the readings is {'fast' if fast > 0.0 else 'slow'} by {1e6 * abs(fast):.2g} ppm against "
+            "that of the commands: the readings were put onto the clock of the commands."
+        )
     if late < ALIKE:
-        return []
+        return said
     return [
+        *said,
         f"All readings come {1e3 * late:.2g} ms late or more, which is taken for the data logger's delay: state "
-        "filter or delay of the channels in the import map to have effects of such a delay judged."
+        "filter or delay of the channels in the import map to have effects of such a delay judged.",
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +18,9 @@ from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING
 from common.signals import alike
 from diagnosis.recorded.laboratory import RecordedLaboratory, recorded
+from diagnosis.signals import clock
 from diagnosis.signals.mask import Mask
+from diagnosis.signals.noise import quantum
 from laboratories import effects
 from laboratories.effects.effect import Effect
 from laboratories.effects.sites import BUILDING, LINK, sensors
@@ -28,6 +30,7 @@ from models.registry import Array
 from models.system import System
 
 MASTER_FIRST = ("master", "slave")
+SAME = 0.9  # share of the forces used that are values of a reading, from which on all are
 LEAST_TICKS = 50  # without which nothing is judged: 0.1 s at 2 ms, and fewer ticks than a correlation needs
 
 
@@ -61,6 +64,7 @@ class Record:
     plans: dict[str, Plan] = field(default_factory=dict)  # by role, as each sees it
     labs: tuple[RecordedLaboratory, ...] = ()  # the laboratories that it shows, the master's first
     held: float | None = None  # test time (s) of the first hold, before which it ends; None without a hold
+    fast: float = 0.0  # rate by which the clock of its readings was fast before they were put right
 
     @cached_property
     def stated(self) -> ImportedData | None:
@@ -129,6 +133,28 @@ class Record:
     def has(self, *names: str) -> bool:
         """Whether all these signals are there for most of the test."""
         return all(name in self.signals and self.present[name].mean() > 0.5 for name in names)
+
+    def put_right(self, fast: float) -> Record:
+        """The record with readings of a clock that is fast by a rate on the clock of the commands.
+
+        So are the forces that the master used, where they are those that were read.
+        """
+        there = [lab for lab in self.labs if lab.role != MASTER]
+        used = {lab.signal(lab.kind.channels.used): lab.signal(lab.kind.channels.force) for lab in there}
+        names = [name for lab in self.labs for name in lab.measured if name in self.signals]
+        names += [
+            name
+            for name, force in used.items()
+            if self.has(name, force) and np.isin(self.signals[name], self.signals[force]).mean() > SAME
+        ]
+        moved = {
+            name: clock.put_right(
+                self.signals[name], fast, stepped=quantum(self.signals[name][self.present[name]]) > 0.0
+            )
+            for name in names
+            if self.present[name].any()
+        }
+        return replace(self, signals=self.signals | moved, fast=fast)
 
     @property
     def time(self) -> Array:

@@ -177,9 +177,11 @@ def test_a_reading_that_saturates_is_also_looked_for_above_what_was_reached(case
     assert min(limits) < peak < 2.0 * peak < max(limits)
 
 
-@pytest.mark.parametrize("effect", ["actuator.backlash", "table.backlash"])
-def test_a_play_that_swallows_most_of_a_small_motion_is_found(cases: Cases, effect: str) -> None:
-    motion = {"actuator": "column_displacement", "table": "table_displacement"}[effect.split(".")[0]]
+@pytest.mark.parametrize(
+    ("effect", "motion"),
+    [("actuator.backlash", "column_displacement"), ("table.backlash", "table_displacement")],
+)
+def test_a_play_that_swallows_most_of_a_small_motion_is_found(cases: Cases, effect: str, motion: str) -> None:
     width = 1.4 * Scales(cases.record(scale=0.01, duration=6.0)).peak(motion)
     report = cases.report({effect: {"width": width}}, scale=0.01, duration=6.0)
     assert named(report) == [effect]
