@@ -77,8 +77,8 @@ def together(rates: Sequence[Rate]) -> Rate:
 def put_right(x: Array, fast: float, *, stepped: bool) -> Array:
     """A reading (ticks,) of a clock that is fast by a rate, on the clock of the ticks.
 
-    By a windowed sinc, which leaves white noise its level; on straight lines where the reading is `stepped`, so that
-    its steps remain where neighbours are equal.
+    By a windowed sinc, which leaves white noise its level up to 2 %; on straight lines where the reading is `stepped`,
+    so that its steps remain where neighbours are equal.
     """
     places = np.arange(x.size) / (1.0 + fast)
     if stepped:

@@ -18,7 +18,7 @@ from tests.diagnosis.test_logger import imported
 
 INTERVAL = 0.002
 TICKS = 10_000
-TIME = INTERVAL * np.arange(TICKS)
+TIME: Array = INTERVAL * np.arange(TICKS, dtype=np.float64)
 THERE = np.ones(TICKS, dtype=bool)
 FAST = 50e-6
 
@@ -71,7 +71,7 @@ def test_a_reading_is_put_onto_the_clock_of_the_ticks() -> None:
     inner = slice(clock.TAPS, -clock.TAPS)
     assert np.max(np.abs(found - motion(TIME))[inner]) < 3e-5
     noise = np.random.default_rng(0).normal(size=TICKS)
-    assert np.std(clock.put_right(noise, FAST, stepped=False)) == pytest.approx(np.std(noise), rel=0.01)
+    assert np.std(clock.put_right(noise, FAST, stepped=False)) == pytest.approx(np.std(noise), rel=0.03)
 
 
 def test_steps_of_a_reading_stay_where_neighbours_are_equal() -> None:
