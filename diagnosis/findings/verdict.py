@@ -33,7 +33,8 @@ MOST_LEFT = 0.2  # of a gap's rms that effects may leave as an error of such sol
 # energy.
 OWN = 0.4
 # Noise of a reading at its loudest frequency over that at the highest ones, from which on it is doubted where no other
-# reading of its laboratory has more than QUIET. Pink noise of a test has less than LONE.
+# reading of its laboratory has more than QUIET, or all others have so many times less. Pink noise of a test has less
+# than LONE.
 LONE, QUIET = 10.0, 2.0
 # Standard deviations of Σ z² above its mean from which on the nominal parameters speak against the effects beside them.
 STRAINED = 3.0
@@ -80,7 +81,7 @@ def judge(search: Search) -> PartVerdict:
         outcome = without_effects(bare)
         return PartVerdict(bare, outcome, 1.0, (), (), doubted=name if outcome == "unknown" else "")
     outcome = how_well(search)
-    if outcome == "unknown" or (outcome == "partly" and imitated(search)):
+    if outcome == "unknown" or (outcome == "partly" and imitated(search)) or trifling(search):
         return unnamed(search)
     chances = odds(search)
     same = [tied(search.chosen, other) for other in search.alternatives]
@@ -144,10 +145,11 @@ def unnamed(search: Search) -> PartVerdict:
 
 
 def heard_as_noise(search: Search) -> tuple[Search, str]:
-    """A search without effects, under white noise where coloured noise of readings may hide an unknown effect.
+    """A search without effects, under less noise where coloured noise of readings may hide an unknown effect.
 
-    With it goes the reading of which that is doubtful, empty where none is: noise that several readings have as they
-    would follow from one motion is that motion.
+    That is white noise, or for a lone reading the noise that all readings have. With it goes the reading of which that
+    is doubtful, empty where none is: noise that several readings have as they would follow from one motion is that
+    motion.
     """
     name = lone_noise(search.chosen)
     if not name and np.max(sensor_noise.loudest(search.chosen), initial=0.0) < LONE:
@@ -155,7 +157,7 @@ def heard_as_noise(search: Search) -> tuple[Search, str]:
     white = in_white_noise(search)
     if moves(white.chosen):
         return white, ""
-    return (white, name) if name else (search, "")
+    return (in_common_noise(search), name) if name else (search, "")
 
 
 def moves(fit: Fit) -> bool:
@@ -166,15 +168,24 @@ def moves(fit: Fit) -> bool:
 
 
 def lone_noise(fit: Fit) -> str:
-    """The only reading with loud slow noise of which nothing but the residual tells, empty where there is none.
+    """The only reading with loud slow noise of which nothing but its motion tells, empty where there is none.
 
     A logger treats its channels alike, and what a machine with a resonance does by an unknown effect looks like this.
+    Where the machine is not at rest the effect is there as well, in the part that moves least too.
     """
     loud = sensor_noise.loudest(fit)
-    own = all(item.source == "residual" for item in fit.data.noise)
-    if not own or loud.size < 2 or np.max(loud) < LONE or np.sort(loud)[-2] > QUIET:
+    if loud.size < 2 or any(item.source == "at rest" for item in fit.data.noise):
+        return ""
+    second, first = np.sort(loud)[-2:]
+    if first < LONE or (second > QUIET and first < LONE * second):
         return ""
     return fit.data.part.signals[int(np.argmax(loud))]
+
+
+def in_common_noise(search: Search) -> Search:
+    """A search without effects under noise of the colour that all readings have."""
+    bare = fitting.fit(sensor_noise.in_common(search.chosen), {}, search.chosen.z)
+    return replace(search, data=bare.data, commissioned=bare, chosen=bare)
 
 
 def in_white_noise(search: Search) -> Search:
@@ -224,6 +235,23 @@ def artefact(search: Search) -> bool:
     kinds = {data.catalogue[name].kind for name in search.chosen.names}
     logged = any(isinstance(item, LoggedReadings) for item in data.part.nuisances)
     return kinds == {"measurement"} and not logged and search.explained < 1.0 - REST
+
+
+def trifling(search: Search) -> bool:
+    """Whether nothing but gains of readings is named, smaller than what their machine is known to.
+
+    That a reading is too large by less than the tolerances of the machine's parameters follows only if the machine's
+    model is exact beyond them: a parameter that is no constant, within its tolerance, changes the reading as much. The
+    machine must change the same readings.
+    """
+    data, fit = search.data, search.chosen
+    known = min((item.tolerance for item in data.part.nuisances if not item.of_record), default=0.0)
+    effects = [data.catalogue[name] for name in fit.names]
+    gains = [abs(fit.values[item.name]["factor"] - 1.0) for item in effects if item.fault == "gain"]
+    if len(gains) < len(effects) or max(gains) >= known:
+        return False
+    sites = {item.site for item in ranked(search.commissioned) if item.cost < APART}
+    return not sites <= {item.site for item in effects}
 
 
 def misplaced(search: Search) -> bool:

@@ -179,6 +179,25 @@ def whitened(fit: Fit) -> Data:
     )
 
 
+def in_common(fit: Fit) -> Data:
+    """The data of a fit with noise of the colour that all readings have, each at its level of the highest frequencies.
+
+    A logger treats its channels alike, so that what one of them has beyond that colour need not be noise. It is white
+    where the noise of any reading is.
+    """
+    white, models = whitened(fit), remodelled(fit).noise
+    pairs = [(item, level) for item, level in zip(models, white.white, strict=True) if level > 0.0]
+    shapes = [item.density / level**2 for item, level in pairs if item.density is not None]
+    if not shapes or len(shapes) < len(pairs):
+        return white
+    shape, rms = np.min(shapes, axis=0), min(item.rms / level for item, level in pairs)
+    noise = tuple(
+        replace(item, rms=float(rms * level), density=level**2 * shape)
+        for item, level in zip(models, white.white, strict=True)
+    )
+    return residuals.measured_by(replace(white, noise=noise), rms * white.white)
+
+
 def share(data: Data) -> float:
     """Largest of `shares`."""
     return float(np.max(shares(data), initial=0.0))

@@ -12,20 +12,26 @@ from diagnosis.diagnose import doubted, examine
 from diagnosis.findings import where
 from diagnosis.findings.certainty.trust import share_named
 from diagnosis.findings.report import status_of
-from diagnosis.findings.verdict import PartVerdict, allowed, artefact, at_end, farthest, judge
-from diagnosis.fits import fitting, residuals, settling
+from diagnosis.findings.verdict import PartVerdict, allowed, artefact, at_end, farthest, judge, lone_noise
+from diagnosis.fits import fitting, residuals, sensor_noise, settling
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import PartOfGap
+from diagnosis.signals.noise_model import Source
 from models.registry import Array
 from report.gap import wording
 from tests.diagnosis.cases import Cases, lab_a, lab_b, white
 from tests.diagnosis.test_equivalents import DATA, NOISY
 
 GAP = np.sin(0.2 * np.arange(DATA.groups))[:, None]
+MORE, AR1 = (
+    3.0,
+    np.sqrt(1.0 - 0.95**2),
+)  # times a sensor's noise; what makes noise of this correlation one of rms one
+SHAKEN = 1e-5  # m, of a table: the noise of its displacement sensor
 RESONANCE, WANDER = 0.3, 3e-5  # Hz, of the default damper; m, fifteen times the noise of its stroke's sensor
 
 
@@ -72,22 +78,40 @@ def test_errors_of_readings_that_leave_a_tenth_of_a_gap_are_not_its_cause() -> N
     assert not artefact(search(5.0, "column.friction"))
 
 
-def wandering(whole: Record, *names: str) -> Record:
-    """The record with slow noise on some readings, as loud beside their own as the wander of the stroke."""
+@pytest.mark.parametrize(("factor", "outcome"), [(1.005, "unknown"), (1.05, "explained")])
+def test_a_gain_of_a_reading_within_tolerances_may_be_its_machine(
+    cases: Cases, factor: float, outcome: str
+) -> None:
+    effect = {"sensor.damper_stroke.gain": {"factor": factor}}
+    whole = cases.record(effect)
+    bare = bare_fit(whole)
+    found = judge(Search(bare.data, bare, settling.settled(fitting.fit(bare.data, effect, bare.z)), ()))
+    assert found.outcome == outcome
+    if outcome == "unknown":
+        assert where.culprits(found.search.chosen) == ("damper", "sensor.damper_stroke")
+
+
+def wandering(whole: Record, *names: str, wander: float = WANDER) -> Record:
+    """The record with slow noise on some readings, as loud beside their own as the `wander` (m) of the stroke."""
     damped = signal.tf2sos(
         [1.0, 0.0, -1.0], np.poly(0.999 * np.exp(2j * np.pi * RESONANCE * 0.002 * np.array([1, -1]))).real
     )
     changed = {}
     for number, name in enumerate(names):
         slow = signal.sosfilt(damped, white(31 + number, whole.ticks))
-        scale = WANDER * whole.labs[1].noise[name] / whole.labs[1].noise["damper_stroke"]
+        scale = wander * whole.labs[1].noise[name] / whole.labs[1].noise["damper_stroke"]
         changed[name] = whole.signals[name] + scale * slow / np.std(slow)
     return replace(whole, signals=whole.signals | changed)
 
 
+def bare_fit(whole: Record) -> Fit:
+    """The slave's laboratory without effects, under the noise that this leaves."""
+    return settling.settled(fitting.fit(residuals.prepare(lab_b(whole), whole), {}))
+
+
 def judged(whole: Record) -> PartVerdict:
     """The verdict on the slave's laboratory where no effect is found."""
-    bare = settling.settled(fitting.fit(residuals.prepare(lab_b(whole), whole), {}))
+    bare = bare_fit(whole)
     return judge(Search(bare.data, bare, bare, ()))
 
 
@@ -95,6 +119,60 @@ def test_loud_slow_noise_of_a_single_reading_may_be_an_unknown_effect(cases: Cas
     found = judged(wandering(cases.record(), "damper_stroke"))
     assert (found.outcome, found.doubted) == ("unknown", "damper_stroke")
     assert doubted([found])[0].startswith("What damper_stroke shows")
+
+
+def test_slow_noise_is_proven_by_rest_alone(cases: Cases) -> None:
+    fit = bare_fit(wandering(cases.record(), "damper_stroke"))
+
+    def told(source: Source) -> str:
+        noise = tuple(replace(item, source=source) for item in fit.data.noise)
+        return lone_noise(replace(fit, data=replace(fit.data, noise=noise)))
+
+    assert told("quiet part") == "damper_stroke"
+    assert told("at rest") == ""
+
+
+def behind_logger(whole: Record) -> Record:
+    """The record with slow noise of one colour on all readings of the slave's laboratory."""
+    lab = whole.labs[1]
+    coloured = {
+        name: whole.signals[name]
+        + MORE * lab.noise[name] * signal.lfilter([AR1], [1.0, -0.95], white(51 + number, whole.ticks))
+        for number, name in enumerate(lab.measured)
+    }
+    return replace(whole, signals=whole.signals | coloured)
+
+
+def test_slow_noise_far_louder_than_that_of_all_other_readings_may_be_an_unknown_effect(
+    cases: Cases,
+) -> None:
+    alike = behind_logger(cases.record())
+    lab = alike.labs[1]
+    found = judged(wandering(alike, "damper_stroke", wander=MORE * WANDER))
+    assert (found.outcome, found.doubted) == ("unknown", "damper_stroke")
+    assert where.culprits(found.search.chosen) == ("damper", "sensor.damper_stroke")
+    levels = [
+        item.rms / lab.noise[name] for item, name in zip(found.search.data.noise, lab.measured, strict=True)
+    ]
+    assert levels == pytest.approx([levels[0]] * len(levels), rel=0.3)  # a logger treats its channels alike
+    assert judged(alike).doubted == ""
+
+
+def moved_table(whole: Record) -> Record:
+    """The record of a slave whose table moves slowly beside its command."""
+    part = lab_b(whole)
+    command = next(iter(part.inputs))
+    slow = signal.lfilter([AR1], [1.0, -0.95], white(43, whole.ticks))
+    change = part.replaced(inputs=part.inputs | {command: part.inputs[command] + SHAKEN * slow})
+    system = residuals.prepare(part, whole).system
+    more = dict(zip(part.signals, (change.predict(system) - part.predict(system)).T, strict=True))
+    return replace(whole, signals=whole.signals | {name: whole.signals[name] + x for name, x in more.items()})
+
+
+def test_the_site_of_a_gap_is_sought_beside_the_noise_that_all_readings_have(cases: Cases) -> None:
+    bare = bare_fit(moved_table(behind_logger(cases.record())))
+    white_noise = fitting.at(sensor_noise.whitened(bare), {}, bare.z)
+    assert where.culprits(white_noise) == ("table",)
 
 
 def test_loud_slow_noise_of_several_readings_is_noise(cases: Cases) -> None:

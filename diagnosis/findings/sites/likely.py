@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.findings.sites.signatures import Signature, Spectrum, laboratory_of, signatures
-from diagnosis.fits import hypothesis
+from diagnosis.fits import fitting, hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.residuals import Data
@@ -55,10 +55,16 @@ def likely_sites(fit: Fit) -> tuple[str, ...]:
 
 
 def ranked(fit: Fit) -> list[LikelySite]:
-    """The sites of a laboratory by what speaks against them, the likeliest first."""
+    """The sites of a laboratory by what speaks against them, the likeliest first.
+
+    Where noise was taken to be white because its colour may hide a gap, the colour that all readings have is none of
+    the gap: without it the reading with the loudest noise would be the likeliest site.
+    """
     part = laboratory_of(fit.data.part)
     if part is None:
         return []
+    if not sensor_noise.coloured(fit.data):
+        fit = fitting.at(sensor_noise.in_common(fit), fit.values, fit.z)
     given = spectra(fit)
     system = hypothesis.lay(fit.data, fit.z, fit.values)
     found = [judged(given, item) for item in signatures(part, system, given.frequencies)]
