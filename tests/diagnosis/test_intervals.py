@@ -10,8 +10,10 @@ import pytest
 from scipy.stats import norm, t
 
 from diagnosis.findings.certainty.intervals import (
+    FOREIGN,
     Spread,
     between_formulas,
+    between_solutions,
     covariance,
     intervals,
     mixed,
@@ -91,6 +93,20 @@ def test_parameters_are_refined_on_the_rows_that_selection_did_not_see(cases: Ca
     seen, whole = (np.diag(spread(item).noise)[item.z.size :] for item in (fit, better))
     assert np.all(whole < seen)
     assert better.values["damper.friction"]["force"] == pytest.approx(3.0, rel=0.03)
+
+
+def test_an_interval_leaves_room_for_another_formula(cases: Cases) -> None:
+    name = "damper.friction"
+    whole = cases.record({name: {"force": 3.0}}, duration=4.0)
+    verdict = judge(search(residuals.prepare(lab_b(whole), whole), Scales(whole)))
+    fit = refined(verdict.searched.chosen)
+    problem = Problem(fit.data, fit.values)
+    place = problem.place(fit.values, fit.z)[fit.z.size]
+    half = np.hypot(FOREIGN * spread(fit).half(fit.z.size), between_solutions(fit))
+    (item,) = (free for free in problem.frees if free.parameter.name == "force")
+    given = intervals(verdict)[name]["force"]
+    assert given.low == pytest.approx(item.outward(place - half), rel=1e-3)
+    assert given.high == pytest.approx(item.outward(place + half), rel=1e-3)
 
 
 @pytest.mark.parametrize("limit", [60.0, 120.0])

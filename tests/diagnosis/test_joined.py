@@ -10,7 +10,7 @@ import pytest
 
 from common.errors import InputError
 from diagnosis.diagnose import judged
-from diagnosis.findings.certainty.intervals import intervals
+from diagnosis.findings.certainty.intervals import intervals, refined, spread
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.scales import Scales
@@ -85,7 +85,7 @@ def test_a_second_recording_narrows_the_confidence_interval(cases: Cases) -> Non
         verdict = PartVerdict(Search(data, fit, fit, ()), "explained", 1.0, (), ())
         found = intervals(verdict)["damper.friction"]["force"]
         assert found.low < 3.0 < found.high
-        widths.append(found.high - found.low)
+        widths.append(spread(refined(fit)).half(fit.z.size))
     assert widths[1] < 0.9 * widths[0]
 
 
