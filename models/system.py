@@ -127,6 +127,7 @@ class DamperEffects:
     friction_speed: float = 0.02  # m/s, at which two thirds of that are lost
     presliding: float = 0.0  # m, in which the friction's bristles bend; 0 for a friction that sticks at once
     force_limit: float = math.inf  # N
+    force_limit_sharpness: float = math.inf  # of the bend there, as in `models.saturation`
     offset: float = 0.0  # N, a constant force on the moving mass
     stop_stroke: float = math.inf  # m
     stop_stiffness: float = 0.0  # N/m

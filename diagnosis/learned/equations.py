@@ -22,6 +22,7 @@ from diagnosis.signals.systematic import systematic
 from loop import replay
 from models import friction, stops
 from models.registry import Array
+from models.saturation import saturated
 from models.system import DamperEffects, System, TableEffects
 
 STILL = 1e-3  # m/s, below which the sign of a measured rate is noise: 2 µm of stroke noise over one interval of 2 ms
@@ -167,7 +168,8 @@ def of_damper(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation]:
 def damper_force(system: System, stroke: Array, rate: Array, command: Array) -> Array:
     """Force (ticks,) N of a damper on its table at a stroke (m) with its rate (m/s), its motor under a command (N)."""
     damper, effects = system.plan.damper, system.effects.damper
-    wanted = np.clip(effects.gain * command, -effects.force_limit, effects.force_limit)
+    level = (effects.force_limit, effects.force_limit_sharpness)
+    wanted = np.vectorize(saturated, otypes=[float])(effects.gain * command, *level)
     lag = damper.motor_time_constant
     kept = float(np.exp(-system.plan.test.interval / lag)) if lag > 0.0 else 0.0
     motor = lfilter([0.0, 1.0 - kept], [1.0, -kept], wanted)

@@ -15,6 +15,7 @@ import numpy as np
 
 from models.compiled import jit
 from models.registry import Array
+from models.saturation import saturated
 from models.system import SensorEffects
 from models.transfer_systems import first_order
 
@@ -67,15 +68,6 @@ def delayed(sensors: Readings, place: int, value: float) -> float:
     late = state[place, KEPT + (newest - whole) % size]
     later = state[place, KEPT + (newest - whole - 1) % size]
     return (1.0 - rest) * late + rest * later
-
-
-@jit
-def saturated(value: float, level: float, sharpness: float) -> float:
-    """`x/(1 + |x/L|ⁿ)^(1/n)`, without a power that could overflow."""
-    share = abs(value) / level
-    if share <= 1.0:
-        return float(value / (1.0 + share**sharpness) ** (1.0 / sharpness))
-    return float(np.copysign(level * (1.0 + share ** (-sharpness)) ** (-1.0 / sharpness), value))
 
 
 @jit

@@ -34,6 +34,7 @@ from laboratories.table.linear import (
 from models import friction, preisach, stops
 from models.compiled import jit
 from models.registry import Array
+from models.saturation import saturated
 from models.system import DamperEffects, TableEffects
 from models.transfer_systems import delay
 
@@ -47,6 +48,7 @@ PRESLIDING = 19  # m, of the rail's friction
 # of the play behind the loop: a half of it m, drag of the guide 1/s, 2ζ/ω of the flanks s, 1/ω² of them s²
 BEHIND, GUIDE, DAMPED, SOFT = 20, 21, 22, 23
 STOP_EXPONENT, STOP_DAMPING = 24, 25
+FORCE_LIMIT_SHARPNESS = 26
 
 # places in `state` behind the states and inputs
 PLAYED, LAST_VELOCITY, BRISTLES = range(3)
@@ -116,6 +118,7 @@ def build(
     for part in (on_table, on_damper):
         limits += [part.friction_asymmetry, part.friction_drop, part.friction_speed]
     limits += [on_damper.presliding, *behind, on_damper.stop_exponent, on_damper.stop_damping]
+    limits += [on_damper.force_limit_sharpness]
     return TableLab(
         segments.taps,
         columns,
@@ -163,8 +166,8 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
     state[rail] = 0.0
     state[drag] = 0.0
     if present:
-        most = limits[FORCE_LIMIT]
-        state[motor] = min(max(limits[MOTOR_GAIN] * motor_command, -most), most)
+        wanted = limits[MOTOR_GAIN] * motor_command
+        state[motor] = saturated(wanted, limits[FORCE_LIMIT], limits[FORCE_LIMIT_SHARPNESS])
         command *= limits[TABLE_GAIN]
     delay.remember(history, command)
     state[after] = delay.delayed(history, taps, 0)

@@ -31,6 +31,7 @@ ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth
     ("actuator.delay", {"delay": 6e-3}, {"delay": 0.1}),  # the plan's own delay is known to 0.28 ms only
     ("column.friction", {"force": 900.0}, {"force": 0.05}),
     ("column.yielding", {"yield_displacement": 1.2e-3, "hardening": 0.1}, {"yield_displacement": 0.05}),
+    ("damper.force_limit", {"force": 30.0, "law": 1.0, "sharpness": 3.0}, {"force": 0.05, "law": 0.0}),
     ("table.gain", {"factor": 0.93}, {"factor": 0.01}),
     ("damper.friction", {"force": 3.0}, {"force": 0.05}),
     ("damper.viscous", {"factor": 1.5}, {"factor": 0.05}),

@@ -2,6 +2,9 @@
 
     T_m·u̇ + u = clip(damper_command, −force, +force)
 
+With `law` 1 the motor saturates gradually, as iron does: u/(1 + |u/force|ⁿ)^(1/n) with n = sharpness in the place of
+the clip.
+
 Not to be confused with `damper.gain`, which is there at small commands too, or `damper.stroke_stop`.
 """
 
@@ -9,8 +12,8 @@ from __future__ import annotations
 
 import math
 
-from laboratories.effects.effect import Parameter
-from laboratories.effects.laws import sets
+from laboratories.effects.effect import Law, Parameter
+from laboratories.effects.laws import sets, which_law
 
 EFFECT = sets(
     "damper",
@@ -27,6 +30,20 @@ EFFECT = sets(
             follows="damper_command",
         ),
     },
+    further={
+        "": which_law(1.0, "0 suddenly, 1 gradually"),
+        "force_limit_sharpness": Parameter(
+            "sharpness",
+            "",
+            null=math.inf,
+            least=1.0,
+            most=20.0,
+            sizes=(1.5, 3.0),
+            says="how suddenly the motor's force bends at the limit under law 1",
+            shape=True,
+        ),
+    },
+    laws=(Law("sudden", {}), Law("gradual", {"sharpness": 3.0})),
     says="the motor has a largest force",
     reference="T_m·u̇ + u = clip(damper_command, ±force)",
 )
