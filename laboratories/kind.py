@@ -199,6 +199,10 @@ class Kind(ABC):
         """Whether the motion of `free` has no restoring force."""
         return False
 
+    def decay(self, plan: Plan) -> float:
+        """The rate (1/s) at which a motion of `free` without a restoring force becomes slower by itself."""
+        return 0.0
+
     @abstractmethod
     def build(self, system: System) -> Any:
         """The laboratory of a system at rest, as its `record`.

@@ -101,6 +101,8 @@ class TableEffects:
     gain: float = 1.0
     oil_frequency: float = math.inf  # Hz
     oil_damping: float = 0.1
+    oil_share: float = 1.0  # of the motion that passes through that resonance
+    velocity_limit: float = math.inf  # m/s, at which the loop's valve is open
     compliance: float = 0.0  # m/N
     backlash: float = 0.0  # m, whole play
     backlash_law: float = 0.0  # 0 before the loop, 1 between loop and platform
@@ -129,6 +131,11 @@ class DamperEffects:
     force_limit: float = math.inf  # N
     force_limit_sharpness: float = math.inf  # of the bend there, as in `models.saturation`
     offset: float = 0.0  # N, a constant force on the moving mass
+    asymmetry: float = 0.0  # share by which the dashpot is stronger in the positive direction
+    second_frequency: float = math.inf  # Hz, of a share of the mass on the coupling that it lies behind
+    second_mass: float = 0.2  # that share
+    second_damping: float = 0.1  # ratio of the coupling's dashpot to the critical one of that share
+    second_play: float = 0.0  # m, whole play of the coupling
     stop_stroke: float = math.inf  # m
     stop_stiffness: float = 0.0  # N/m
     stop_exponent: float = 1.0  # of the depth, as in `models.stops`

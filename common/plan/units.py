@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?(?P<unit>\D.*)?$", re.DOTALL)
 ONE = r"[^\W\d]+(?:[²³]|(?:\^|\*\*)-?\d)?"  # a unit and its power
 # the units that are handed to pint, which would otherwise evaluate any expression, 9**9**9 too
+WRITTEN_BESIDE = re.compile(r"(?<=[a-zA-Z])[23](?!\w)")  # a power as many loggers write it, m/s2
+RAISED = {"2": "²", "3": "³"}
 UNIT = re.compile(rf"%|\(?{ONE}\)?(?:\s*[·*/ ]\s*\(?{ONE}\)?)*\)?")
 LONGEST = (
     60  # characters: ample for 17 digits with an exponent and for the longest unit of a key, 11 characters
@@ -59,6 +61,7 @@ def in_si(text: str, unit: str | None, name: str) -> float:
 
 def converted(number: Decimal, given: str, unit: str | None, name: str) -> float:
     """A number with the unit `given`, converted to the `unit` of the key; raises PlanError where they do not fit."""
+    given = WRITTEN_BESIDE.sub(lambda power: RAISED[power[0]], given)
     if (
         unit and given[1:] == unit and given[0] in PREFIXES and FIRST.match(unit)
     ):  # without loading pint, 0.2 s

@@ -20,6 +20,7 @@ from diagnosis.signals import clock
 # Share of a reading's rms that a nominal model leaves, from which on an effect is at work: noise, a hum of 1 % of the
 # peak and a converter together leave up to 4 %.
 SPOILT = 0.05
+TOLD = 4e-3  # of a reading's gain: the report shows two digits, and less is no matter for a test
 
 
 def interpolated(parts: Sequence[Part]) -> dict[str, float]:
@@ -89,6 +90,25 @@ def missed(fit: Fit) -> float:
 
 
 def remarks(found: Diagnosis) -> list[str]:
+    """Sentences on readings of an import that are late alike or of a fast or slow clock, and on those with a gain."""
+    return [*timed(found), *gained(found)]
+
+
+def gained(found: Diagnosis) -> list[str]:
+    """A sentence for readings with a gain that is taken for the calibration of their channels."""
+    names: dict[float, list[str]] = {}
+    for name, (_, gain) in found.logger.items():
+        if abs(gain - 1.0) >= TOLD and found.record.has(name) and np.ptp(found.record.signals[name]) > 0.0:
+            names.setdefault(gain, []).append(name)
+    return [
+        f"The reading{'s' * (len(those) > 1)} {' and '.join(those)} {'are' if len(those) > 1 else 'is'} "
+        f"{1e2 * abs(gain - 1.0):.2g} % {'larger' if gain > 1.0 else 'smaller'} than the plan says, which is taken for "
+        "the calibration of the channels. A machine of that gain would look the same."
+        for gain, those in names.items()
+    ]
+
+
+def timed(found: Diagnosis) -> list[str]:
     """Sentences where all readings of an import are late alike, and where their clock was fast or slow."""
     late = min((delay for delay, _ in found.logger.values()), default=0.0)
     fast = found.record.fast

@@ -98,7 +98,7 @@ def judge(search: Search) -> PartVerdict:
 
 def odds(search: Search) -> list[float]:
     """How probable each alternative is, over the chosen effects."""
-    noise = max(1.0, search.chosen.chi / search.chosen.reduced.size)
+    noise = max(1.0, search.chosen.chi / search.chosen.data.size)
     worse = [max((other.cost - search.chosen.cost) / noise, 0.0) for other in search.alternatives]
     return [math.exp(-min(one / (2.0 * TEMPERATURE), 700.0)) for one in worse]
 
@@ -132,7 +132,7 @@ def unnamed(search: Search) -> PartVerdict:
     costs = np.array([fit.cost for fit in near])
     odds = np.exp(
         -np.clip(
-            (costs - costs.min()) / max(1.0, costs.min() / search.chosen.reduced.size) / (2.0 * TEMPERATURE),
+            (costs - costs.min()) / max(1.0, costs.min() / search.chosen.data.size) / (2.0 * TEMPERATURE),
             0.0,
             700.0,
         )

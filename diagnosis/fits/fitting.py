@@ -116,7 +116,7 @@ def weights(fit: Fit) -> Array:
 
 def excess(fit: Fit) -> float:
     """What a fit costs beyond noise."""
-    return max(0.0, fit.chi - fit.reduced.size) + fit.prior
+    return max(0.0, fit.chi - fit.data.size) + fit.prior
 
 
 def near(fit: Fit, rival: Fit) -> bool:
@@ -144,7 +144,7 @@ def everywhere(fit: Fit) -> float:
     Fits that have not reached their end are ranked by it: an effect may show in few seconds, all of which they see,
     and until they have found its size they may be worse on the others.
     """
-    return max(0.0, float(np.sum(np.square(fit.reduced))) - fit.reduced.size) + fit.prior
+    return max(0.0, float(np.sum(np.square(fit.reduced))) - fit.data.size) + fit.prior
 
 
 def at(data: Data, values: Values, z: Array) -> Fit:

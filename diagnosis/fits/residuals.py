@@ -62,6 +62,15 @@ class Data:
         """Number of averaged samples."""
         return self.part.measured.shape[0] // self.group
 
+    @cached_property
+    def size(self) -> int:
+        """How many averaged samples have noise: those of signals that were recorded and do not stand still.
+
+        Each costs one where only noise is left. A signal that was not recorded costs nothing, and must not be credited.
+        """
+        heard = self.there.any(axis=0) & (np.ptp(self.part.measured, axis=0) > 0.0)
+        return self.groups * max(1, int(np.count_nonzero(heard)))
+
     def residual(self, system: System) -> Array:
         """Recorded minus predicted, (ticks, signals), zero where nothing was recorded and where a reading has a spike.
 
@@ -185,8 +194,7 @@ def withheld_ticks(ticks: int, interval: float) -> Mask:
 
 def measured_by(data: Data, white: Array) -> Data:
     """The data with residuals in units of a noise (signals,)."""
-    level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
-    least = (EXACT if data.part.exact else MODEL_ERROR) * level + 1e-15
+    least = (EXACT if data.part.exact else MODEL_ERROR) * data.part.level + 1e-15
     rounding = np.where(
         data.rounded > STEPPING * white, COARSE * data.rounded, data.rounded / math.sqrt(12.0)
     )

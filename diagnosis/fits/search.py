@@ -11,9 +11,9 @@ from diagnosis.fits.laws.coupled import coupled
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
-from diagnosis.fits.unexplained import leaves, remaining
+from diagnosis.fits.unexplained import leaves, model_error, remaining
 
-MOST = 3  # effects of one part: more of them can imitate any residual
+MOST = 3  # effects of one part, zeros of sensors aside: more of them can imitate any residual
 # Effects of one part that leave only noise, each of them needed for that; the share of what is left that each must
 # explain on the way. Of 11 gaps of unknown effects and other formulas none was taken for such a set.
 TOGETHER, STEP_OF_LEFT = 6, 0.3
@@ -58,7 +58,9 @@ def search(data: Data, scales: Scales) -> Search:
     if not chosen.names:
         return Search(bare.data, bare, chosen, ())
     before = chosen
-    chosen, as_good = trade.traded(bare, pruned(bare, chosen), first, scales, MOST)
+    chosen = pruned(bare, chosen)
+    most = MOST + len(chosen.names) - count(chosen)
+    chosen, as_good = trade.traded(bare, chosen, first, scales, most)
     if remaining(chosen) < worth.LOUD:  # what leaves more has not found its largest effects yet
         chosen = together(chosen, scales, beside if chosen is before else None)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
@@ -75,14 +77,21 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
     while better and worth.is_worth(bare, chosen, better[0]):
         best = candidates.exchanged(better[0], scales) if len(better[0].names) > 1 else better[0]
         chosen = settling.settled(best, bare.data)
+        while count(chosen) < MOST and (more := settling.beside_colour(chosen, scales)):
+            chosen = more
         if chosen.data is not bare.data:
             bare, *first = settling.all_again((bare, *first), chosen.data)
             if len(chosen.names) == 1 and not worth.is_worth(bare, bare, chosen):
                 return bare, bare, first, None
-        if len(chosen.names) >= MOST or worth.enough(bare, chosen):
+        if count(chosen) >= MOST or worth.enough(bare, chosen):
             return bare, chosen, first, None
         better = candidates.best_laws(chosen, scales)
     return bare, chosen, first, better
+
+
+def count(fit: Fit) -> int:
+    """How many effects of a fit can imitate something else."""
+    return sum(not fit.data.catalogue[name].constant for name in fit.names)
 
 
 def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fit:
@@ -93,7 +102,7 @@ def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fi
     `beside` are fits with one effect more, best first, where they are known already.
     """
     fit, left = chosen, remaining(chosen)
-    while left > FAINT and leaves(fit) and len(fit.names) < TOGETHER:
+    while left > FAINT and leaves(fit, model_error(fit)) and len(fit.names) < TOGETHER:
         further = beside if fit is chosen and beside is not None else candidates.best_laws(fit, scales)
         if not further or excess(further[0]) > (1.0 - STEP_OF_LEFT) * excess(fit):
             break

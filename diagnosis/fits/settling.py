@@ -15,11 +15,11 @@ from diagnosis.fits import candidates, evidence, fitting, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.screening import ScreenedEffect, screen
+from diagnosis.fits.screening import ScreenedEffect
 from diagnosis.fits.sensor_noise import quieter
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, gaps, leaves, model_error
-from diagnosis.fits.worth import is_gap
+from diagnosis.fits.worth import changes, idle, is_gap
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 
@@ -173,6 +173,22 @@ def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
     return bare, found
 
 
+def beside_colour(fit: Fit, scales: Scales) -> Fit | None:
+    """The fit with one effect more in the place of the coloured noise beside its effects; None where there is none.
+
+    Where the first effect explains nearly all of a gap, as a zero of a sensor may, the rest of it looks like noise. What
+    two good solutions of one model may differ by is no effect.
+    """
+    if not sensor_noise.coloured(fit.data):
+        return None
+    white = fitting.polished(fitting.at(sensor_noise.whitened(fit), fit.values, fit.z))
+    if not leaves(white, model_error(white)):
+        return None
+    rivals = sorted(in_white_noise(fit, scales), key=lambda item: evidence.surprise(remodelled(item)))
+    _, found = far_likelier_ones(fit, rivals)
+    return found[0] if found and not idle(found[0], changes(found[0])) else None
+
+
 def far_likelier_ones(bare: Fit, fits: list[Fit]) -> tuple[Fit, list[Fit]]:
     """The fit without effects, and fits with one, best first, under the noise that the best of these leaves.
 
@@ -192,21 +208,22 @@ def as_near(bare: Fit, fit: Fit) -> Fit:
 
     A fit under white noise may take slow noise for a delay, which a few steps under coloured noise do not undo.
     """
-    other = again(fitting.at(bare.data, {}, fit.z), bare.data)
+    other = again(fitting.at(bare.data, bare.values, fit.z), bare.data)
     return min(bare, other, key=fitting.everywhere)
 
 
 def in_white_noise(bare: Fit, scales: Scales) -> list[Fit]:
-    """Fits with one effect over a beginning under white noise, held against the whole test, best first."""
-    white = fitting.at(sensor_noise.whitened(bare), {}, bare.z)
+    """Fits with one effect more over a beginning under white noise, held against the whole test, best first."""
+    white = fitting.at(sensor_noise.whitened(bare), bare.values, bare.z)
     near = fitting.begun(white)
     slopes = near.jacobian[:, : bare.z.size]
-    found = screen(near, white.data.part.candidates, scales)[:RIVALS]
+    promising = candidates.promised(near, scales) if bare.names else candidates.screened(near, scales)
 
     def rough(item: ScreenedEffect) -> Fit:
-        return fitting.fit(near.data, {item.effect.name: item.values}, item.z, ROUGH, slopes, rounds=1)
+        start = {**bare.values, item.effect.name: item.values}
+        return fitting.fit(near.data, start, item.z, ROUGH, slopes, rounds=1)
 
-    fits = each(rough, found)
+    fits = each(rough, promising[:RIVALS])
     whole = [fitting.at(white.data, item.values, item.z) for item in fits]
     return sorted(whole, key=lambda item: item.cost)
 

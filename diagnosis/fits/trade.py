@@ -35,7 +35,7 @@ def tied(chosen: Fit, other: Fit) -> bool:
 
     Two fits that miss the data as far in different ways are not the same: more data would decide between them.
     """
-    noise = max(1.0, chosen.chi / chosen.reduced.size)
+    noise = max(1.0, chosen.chi / chosen.data.size)
     apart = float(np.sum(np.square(other.reduced - chosen.reduced)))
     return (other.cost - chosen.cost) / noise < TIED and apart / noise < APART
 

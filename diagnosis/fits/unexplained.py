@@ -69,8 +69,7 @@ def model_error(fit: Fit) -> Array:
     """What two good solutions of one model may differ by, (signals,) over σ; zero where the part is exact."""
     if fit.data.part.exact:
         return np.zeros(fit.data.sigma.size)
-    level = np.sqrt(np.mean(np.square(fit.data.part.measured), axis=0))
-    return np.asarray(BOTH * MODEL_ERROR * level / fit.data.sigma)
+    return np.asarray(BOTH * MODEL_ERROR * fit.data.part.level / fit.data.sigma)
 
 
 def leaves(fit: Fit, allowed: Array | None = None) -> bool:

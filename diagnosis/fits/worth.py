@@ -37,13 +37,13 @@ def is_gap(fit: Fit) -> bool:
 def enough(bare: Fit, fit: Fit) -> bool:
     """Whether the residual is too small for a further effect to be worth it."""
     return not is_gap(fit) or (
-        excess(fit) < TRACE * min(excess(bare), bare.data.energy) and fit.prior <= SUSPICIOUS
+        excess(fit) < TRACE * min(moving(bare), bare.data.energy) and fit.prior <= SUSPICIOUS
     )
 
 
 def is_worth(bare: Fit, before: Fit, after: Fit) -> bool:
     """Whether the fit `after` with one effect more is worth its parameters; `bare` is the fit without effects."""
-    noise = max(1.0, after.chi / after.reduced.size)
+    noise = max(1.0, after.chi / after.data.size)
     prior, data = before.prior - after.prior, (before.chi - after.chi) / noise
     if max(prior, 0.0) / PRIOR_GAIN + max(data, 0.0) / DATA_GAIN < 1.0 or prior + data <= 0.0:
         return False
@@ -52,7 +52,16 @@ def is_worth(bare: Fit, before: Fit, after: Fit) -> bool:
         return not idle(after, sizes)
     if prior > PRIOR_GAIN and data > -1.0 and remaining(before) < MATERIAL:
         return True
-    return not cancelling(bare, sizes) and refines(bare, before, after)
+    # an effect that brings nominal parameters back as well needs to explain less: two signs of one cause
+    freeing = prior > PRIOR_GAIN and excess(before) - excess(after) > HALF * excess(before)
+    return not cancelling(bare, sizes) and (freeing or refines(bare, before, after))
+
+
+def moving(fit: Fit) -> float:
+    """What a fit costs beyond noise, readings that are off by a constant aside."""
+    held = fit.reduced[~fit.data.train]
+    constant = float(np.sum(np.square(held.mean(axis=0)))) * len(fit.reduced)
+    return max(0.0, excess(fit) - constant)
 
 
 def idle(fit: Fit, sizes: list[Array]) -> bool:
@@ -80,10 +89,10 @@ def refines(bare: Fit, before: Fit, after: Fit) -> bool:
     """Whether a further effect takes away enough of what is left, and of the whole gap.
 
     A gap that is larger than the readings themselves counts as these: a nominal stiffness that means nothing must not
-    hide what a specimen does.
+    hide what a specimen does. Nor must zeros of sensors that are off, which are no motion.
     """
     left, saved = excess(before), excess(before) - excess(after)
-    whole = min(excess(bare), bare.data.energy)
+    whole = min(moving(bare), bare.data.energy)
     # far from any noise a model may well be refined in small steps
     steps = saved > STEP_OF_REST * left and saved > STEP_OF_WHOLE * whole and remaining(before) > LOUD
     return (

@@ -9,14 +9,14 @@ import numpy as np
 from common.recording.imported import NOTHING_STATED
 from common.roles import MASTER
 from diagnosis.recorded.nuisances import Nuisance
-from diagnosis.recorded.parts import of_sites
+from diagnosis.recorded.parts import Measured, of_sites
 from diagnosis.recorded.record import Record
 from loop import substructure
 from models.registry import Array
 from models.system import System
 
 
-class Ground:
+class Ground(Measured):
     """The recorded ground acceleration, predicted from the ground motion of the plan."""
 
     name = "ground"

@@ -43,6 +43,12 @@ class JoinedPart:
         self.measured = np.concatenate([piece.measured for piece in self.pieces])
         self.present = np.concatenate([piece.present for piece in self.pieces])
 
+    @property
+    def level(self) -> Array:
+        """Rms of the readings (signals,) as the pieces have it."""
+        sums = sum(len(piece.measured) * np.square(piece.level) for piece in self.pieces)
+        return np.asarray(np.sqrt(sums / len(self.measured)))
+
     def predict(self, system: System) -> Array:
         """The predicted readings of all pieces without noise, (ticks of all pieces, signals)."""
         return np.concatenate([piece.predict(system) for piece in self.pieces])

@@ -35,9 +35,10 @@ from models.system import System
 # Share of a computed signal's rms below which a difference is rounding of the recording: four digits of a text file.
 EXACT = 1e-4
 UNREST = 0.05  # first value over the largest one from which on a record does not begin at rest
-# A damper without a spring is replayed anew every PIECE seconds, since an error of force grows into a drift; a cubic
-# over REACH ticks to each side (20 ms) gives its place and rate there.
-PIECE, REACH = 1.0, 10
+# A damper without a spring is replayed anew every PIECE seconds, since an error of force grows into a drift that hides
+# all that is faster; a cubic over REACH ticks to each side (20 ms) gives its place and rate there. 0.1 N on 100 kg
+# moves it by 30 µm in a piece, 1 N that changes sign every 10 mm at 0.2 m/s by 3 µm.
+PIECE, REACH = 0.25, 10
 # Systems of which a part keeps what they did: as many as the slopes of a fit take, and no more numbers than these.
 PLAYED, NUMBERS = 8, 4_000_000
 # Difference of two good solutions of one model over a measured signal's rms; nothing below is a gap.
@@ -63,6 +64,10 @@ class Part(Protocol):
     measured: Array  # (ticks, signals)
     present: Mask  # (ticks, signals)
     exact: bool  # computed, not measured: free of noise
+
+    @property
+    def level(self) -> Array:
+        """Rms of the readings (signals,) that a solution of the model may err by a share of."""
 
     def predict(self, system: System) -> Array:
         """Outputs of the part without noise, (ticks, signals)."""
@@ -103,6 +108,17 @@ def of_sites(record: Record, sites: Collection[str], plan: Plan) -> tuple[Effect
     return tuple(one for one in found if not one.in_samples and not (one.timed and record.static))
 
 
+class Measured:
+    """What parts have in common whose readings stand for themselves."""
+
+    measured: Array
+
+    @property
+    def level(self) -> Array:
+        """Rms of the readings (signals,)."""
+        return np.asarray(np.sqrt(np.mean(np.square(self.measured), axis=0)))
+
+
 class LaboratoryPart:
     """A laboratory replayed from its recorded commands."""
 
@@ -121,7 +137,7 @@ class LaboratoryPart:
         machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]
         names = tuple(name for machine in machines for name in machine.parameters)
         self.channels = channels(record, lab)
-        self._interval = record.plan.test.interval
+        self._interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)
         sites = [
@@ -132,7 +148,9 @@ class LaboratoryPart:
         command = self.inputs[next(iter(self.inputs))]
         first, most = command[0], np.max(np.abs(command))
         self._start = float(first) if abs(first) > UNREST * most else 0.0
-        self.anew = self.beginnings(record)
+        self.anew, self.freed = self.beginnings(record), -1
+        if lab.kind.drifts(lab.plan) and self.anew is not None:
+            self.freed = self.signals.index(lab.signal(lab.kind.free))
         if self.anew is not None and not lab.kind.drifts(lab.plan) and self.rested(record.systems[lab.role]):
             self.anew = None
 
@@ -169,7 +187,39 @@ class LaboratoryPart:
         for place, channel in enumerate(self.channels):
             if channel.filter is not None or channel.delay != 0.0:
                 found[:, place] = channel.through(found[:, place], self._interval)
+        if self.freed >= 0:
+            found[:, self.freed] += self.begun_elsewhere(self.measured[:, self.freed] - found[:, self.freed])
         return found
+
+    @property
+    def level(self) -> Array:
+        """Rms of the readings (signals,), of a motion without a restoring force that of what forces did to it."""
+        read = self.measured
+        if self.freed >= 0:
+            read = read.copy()
+            read[:, self.freed] -= self.begun_elsewhere(read[:, self.freed])
+        return np.asarray(np.sqrt(np.mean(np.square(read), axis=0)))
+
+    def begun_elsewhere(self, missed: Array) -> Array:
+        """Of what a replay in pieces misses (ticks,), the share that follows from where and how fast each piece begins.
+
+        That is known from a few noisy samples only, so the best place and rate of each piece are taken.
+        """
+        starts = np.asarray(self.anew)[:, 0].astype(int)
+        lengths = np.diff(np.append(starts, missed.size))
+        after = (np.arange(missed.size) - np.repeat(starts, lengths)) * self._interval
+        slope = -np.expm1(-self._decay * after) / self._decay if self._decay > 0.0 else after
+        there = self.present[:, self.freed].astype(np.float64)
+
+        def summed(values: Array) -> Array:
+            return np.asarray(np.add.reduceat(there * values, starts))
+
+        count, first, second = summed(np.ones(missed.size)), summed(slope), summed(slope**2)
+        whole, along = summed(missed), summed(slope * missed)
+        spread = np.maximum(count * second - first**2, np.finfo(np.float64).tiny)
+        rate = (count * along - first * whole) / spread
+        place = (whole - rate * first) / np.maximum(count, 1.0)
+        return np.asarray(np.repeat(place, lengths) + np.repeat(rate, lengths) * slope)
 
     def motion(self, system: System, drive: list[Array]) -> Array:
         """What sensors without error would read, (ticks, channels), of a system with such sensors.
@@ -223,7 +273,7 @@ class LaboratoryPart:
             self, ticks, {name: values[:ticks] for name, values in self.inputs.items()}
         )
         if self.anew is not None:
-            result.anew = self.anew[self.anew[:, 0] < ticks]
+            result.anew = self.anew[(self.anew[:, 0] < ticks - 2 * REACH) | (self.anew[:, 0] == 0)]
         return result
 
     def logged(self, delay: float, spread: float | None = None) -> LaboratoryPart:
@@ -263,7 +313,7 @@ class LaboratoryPart:
         return with_fields(self, fields)
 
 
-class ColumnAlone:
+class ColumnAlone(Measured):
     """The column replayed from its measured deformation, where no actuator command was recorded."""
 
     name = "column"
@@ -290,7 +340,7 @@ class ColumnAlone:
         return result
 
 
-class Building:
+class Building(Measured):
     """The numerical substructure from the ground motion and the forces that the master used.
 
     It is exact where the recorded forces are the very numbers that the master used; otherwise a logger recorded them.

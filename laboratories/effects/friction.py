@@ -29,7 +29,7 @@ FURTHER = {
         least=-0.95,
         most=0.95,
         sizes=(),
-        says="share by which the force of law 1 is larger in the positive direction, and smaller in the negative one",
+        says="share by which the force is larger in the positive direction, and smaller in the negative one",
         shape=True,
     ),
     "friction_drop": Parameter(
@@ -39,7 +39,7 @@ FURTHER = {
         least=-3.0,
         most=0.95,
         sizes=(),
-        says="share by which the force of law 1 decreases at high speed",
+        says="share by which the force decreases at high speed",
         shape=True,
     ),
     "friction_speed": Parameter(

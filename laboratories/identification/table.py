@@ -15,15 +15,13 @@ from models.compiled import jit
 from models.registry import Array
 
 LEAST = 50  # samples: more than ten for each parameter of the fit
-NAMES = ("frequency", "damping_ratio", "delay")
-UNITS = ("Hz", "", "s")
+NAMES = ("frequency", "damping_ratio", "delay", "gain")
+UNITS = ("Hz", "", "s", "")
 # Bounds of the fit, beyond any shaking table in use: slower ones cannot follow a building, faster ones look ideal at 2
 # ms.
-LOW = (0.2, 0.02, 0.0)
-HIGH = (200.0, 5.0, 0.5)
-HOPELESS = (
-    0.8  # nrmse above which the fit is rejected: a constant has the nrmse 1, and here no gain is fitted
-)
+LOW = (0.2, 0.02, 0.0, 0.2)
+HIGH = (200.0, 5.0, 0.5, 5.0)
+HOPELESS = 0.8  # nrmse above which the fit is rejected: a constant has the nrmse 1
 COHERENT = 0.8  # least coherence of a frequency that is used: a fifth of the power there is noise
 
 
@@ -60,13 +58,14 @@ def response(command: Array, interval: float, table: ShakingTable) -> Array:
 
 
 def least_squares(command: Array, displacement: Array, interval: float) -> Identified:
-    """`frequency` (Hz), `damping_ratio` and dead time `delay` (s) of the table from a record of any motion.
+    """`frequency` (Hz), `damping_ratio`, dead time `delay` (s) and `gain` of the table from a record of any motion.
 
     `command` (m) and `displacement` (m) have one value per tick of `interval` (s): the command written at
-    tick k is ramped and reached at tick k + 1. The record begins at rest; the sensor's level is fitted too; the gain is
-    1. The prediction uses the exact kernel of the emulated table; the intervals follow from Jacobian and residual,
-    corrected for autocorrelation (`estimate.of_fit`). Motion well below the natural frequency determines L + 2ζ/ω only,
-    and the intervals are then wide.
+    tick k is ramped and reached at tick k + 1. The record begins at rest; the sensor's level is fitted too. The gain is
+    that of loop and sensor together: without it an error of the calibration would be taken for a slower loop. The
+    prediction uses the exact kernel of the emulated table; the intervals follow from Jacobian and residual, corrected
+    for autocorrelation (`estimate.of_fit`). Motion well below the natural frequency determines L + 2ζ/ω only, and the
+    intervals are then wide.
 
     Raises:
         InputError: too short, unequal lengths, not finite, constant, or a displacement that does not follow.
@@ -86,14 +85,14 @@ def least_squares(command: Array, displacement: Array, interval: float) -> Ident
         table = ShakingTable(
             frequency=float(np.exp(x[0])), damping_ratio=float(np.exp(x[1])), delay=float(x[2])
         )
-        return response(moved, interval, table) + x[3] * spread
+        return x[3] * response(moved, interval, table) + x[4] * spread
 
     def residual(x: Array) -> Array:
         return (model(x) - displacement) / spread
 
     level = float(displacement[0]) / spread
     guesses = [
-        np.array([np.log(frequency), np.log(ratio), dead_time, level])
+        np.array([np.log(frequency), np.log(ratio), dead_time, 1.0, level])
         for frequency in (3.0, 8.0, 15.0, 30.0, 80.0)
         for ratio in (0.3, 0.8)
         for dead_time in (0.0, 0.005, 0.02, 0.06)
@@ -103,14 +102,14 @@ def least_squares(command: Array, displacement: Array, interval: float) -> Ident
         residual,
         best,
         bounds=(
-            [np.log(LOW[0]), np.log(LOW[1]), LOW[2], -np.inf],
-            [np.log(HIGH[0]), np.log(HIGH[1]), HIGH[2], np.inf],
+            [np.log(LOW[0]), np.log(LOW[1]), *LOW[2:], -np.inf],
+            [np.log(HIGH[0]), np.log(HIGH[1]), *HIGH[2:], np.inf],
         ),
         x_scale="jac",
         diff_step=1e-6,
     )
     fitted = model(result.x)
-    slopes = np.array([np.exp(result.x[0]), np.exp(result.x[1]), 1.0])  # logarithms back to units
+    slopes = np.array([np.exp(result.x[0]), np.exp(result.x[1]), 1.0, 1.0])  # logarithms back to units
     result.jac = result.jac / np.append(slopes, 1.0)
     result.x = np.append([np.exp(result.x[0]), np.exp(result.x[1])], result.x[2:])
     misfit = estimate.nrmse(displacement, fitted)

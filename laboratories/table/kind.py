@@ -85,6 +85,10 @@ class TableKind(Kind):
         """Whether the damper has no spring."""
         return plan.damper.stiffness == 0.0
 
+    def decay(self, plan: Plan) -> float:
+        """The rate (1/s) of the damper's dashpot."""
+        return plan.damper.damping / plan.damper.mass
+
     def build(self, system: System) -> TableLab:
         """Shaking table and damper of a system, at rest."""
         plan, effects = system.plan, system.effects

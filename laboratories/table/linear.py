@@ -27,6 +27,7 @@ def propagation(length: float, table: ShakingTable, damper: Damper, effects: Tab
         "compliance": 0.0,
         "friction": 0.0,
         "oil_frequency": math.inf,
+        "velocity_limit": math.inf,
         "learned": (),
     }
     for name, null in nulls.items():
@@ -55,7 +56,8 @@ def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: 
     """Propagation over one segment of `length` s for a table of second order; shape (n, n + 5).
 
     Under the damper's force F the table gives way as if its command were changed by compliance·F.
-    With an oil column the platform follows the table below it as a second oscillator.
+    With an oil column the platform follows the table below it as a second oscillator, or by a share σ of its motion:
+    ÿ = (1 − σ)·ẍ + ω_o²·(x − y) + 2ζ_o·ω_o·((1 − σ)·ẋ − ẏ), with x the motion of the table below it.
     """
     size = 6 if math.isinf(effects.oil_frequency) else 8
     place, rate = (TABLE, TABLE_RATE) if size == 6 else (BASE, BASE_RATE)
@@ -77,6 +79,11 @@ def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: 
         a[TABLE, TABLE_RATE] = 1.0
         a[TABLE_RATE, TABLE], a[TABLE_RATE, TABLE_RATE] = -(oil**2), -2.0 * effects.oil_damping * oil
         a[TABLE_RATE, BASE] = oil**2
+        straight = 1.0 - effects.oil_share
+        if straight != 0.0:
+            a[TABLE_RATE] += straight * a[rate]
+            a[TABLE_RATE, BASE_RATE] += straight * 2.0 * effects.oil_damping * oil
+            b[TABLE_RATE] += straight * b[rate]
         if effects.backlash_law == BEHIND_LOOP:  # dashpots of flanks are between the two
             a[TABLE_RATE, BASE_RATE] = 2.0 * effects.oil_damping * oil
     damper_rows(a, b, damper)

@@ -49,10 +49,16 @@ PRESLIDING = 19  # m, of the rail's friction
 BEHIND, GUIDE, DAMPED, SOFT = 20, 21, 22, 23
 STOP_EXPONENT, STOP_DAMPING = 24, 25
 FORCE_LIMIT_SHARPNESS = 26
+# highest speed of the table's loop m/s, and of that loop ω/(2ζ) and 2ζω, 1/s
+FASTEST, OPENING, VALVE = 27, 28, 29
+ASYMMETRY = 30  # of the damper's dashpot
+# of a mass behind a coupling: itself kg, spring 1/s² and dashpot 1/s over it, a half of the coupling's play m, and the
+# whole mass over the first one
+SECOND, COUPLING, COUPLED_RATE, GAP, WHOLE = 31, 32, 33, 34, 35
 
 # places in `state` behind the states and inputs
-PLAYED, LAST_VELOCITY, BRISTLES = range(3)
-MEMORIES = 3
+PLAYED, LAST_VELOCITY, BRISTLES, APART, APART_RATE, HELD = range(6)
+MEMORIES = 6
 ROWS = 8  # of a column: as many with an oil column as without one, so that they are carried side by side
 # Of Halley's method: four of them leave an error of rounding as long as friction stops the mass, within a segment, over
 # no more than a thousand times the presliding; 200 N on 16 kg do so over 0.8 µm.
@@ -70,8 +76,9 @@ class TableLab(NamedTuple):
     spring: Array  # (stiffness N/m, dashpot N·s/m) of the damper
     limits: Array  # effects that are not in the matrices
     history: Array  # table commands written, newest first
-    # (n + 8,), n = 6, or 8 with an oil column: behind the states the inputs, the command after the play, an ideal
-    # table's last velocity, and the bristles' force
+    # (n + 11,), n = 6, or 8 with an oil column: behind the states the inputs, the command after the play, an ideal
+    # table's last velocity, the bristles' force, and of a mass behind a coupling how far it is ahead of the first one,
+    # the rate of that, and the coupling's force on the first one
     state: Array
     free: Array  # (ROWS,): the states at a segment's end without g and the table's friction
     learned: Array  # a law of `models.preisach` of the stroke, empty for none
@@ -100,7 +107,10 @@ def build(
     present = on_table != TableEffects() or on_damper != DamperEffects()
     short = on_table.backlash or on_table.friction or on_damper.friction or on_damper.stop_stiffness
     law, braked = np.array(on_damper.learned), np.array(on_table.learned)
-    short = short or law.size > 0 or braked.size > 0
+    short = short or law.size > 0 or braked.size > 0 or on_damper.asymmetry != 0.0
+    short = short or not (math.isinf(on_table.velocity_limit) and math.isinf(on_damper.second_frequency))
+    behind_coupling = coupling(damper, on_damper)
+    damper = replace(damper, mass=damper.mass - behind_coupling[0])
     segments = delay.split(interval, table.delay, substeps(interval) if short else 1)
     alike: dict[float, Array] = {}  # equal steps differ by rounding only
     for length in segments.lengths:
@@ -119,6 +129,7 @@ def build(
         limits += [part.friction_asymmetry, part.friction_drop, part.friction_speed]
     limits += [on_damper.presliding, *behind, on_damper.stop_exponent, on_damper.stop_damping]
     limits += [on_damper.force_limit_sharpness]
+    limits += [*valve(table, on_table), on_damper.asymmetry, *behind_coupling]
     return TableLab(
         segments.taps,
         columns,
@@ -143,6 +154,23 @@ def plays(effects: TableEffects) -> tuple[float, tuple[float, float, float, floa
     return 0.0, (0.5 * effects.backlash, effects.guide, 2.0 * effects.oil_damping / omega, 1.0 / omega**2)
 
 
+def valve(table: ShakingTable, effects: TableEffects) -> tuple[float, float, float]:
+    """What `limits` holds of a loop whose valve opens so far only, from place `FASTEST` on."""
+    if math.isinf(effects.velocity_limit):
+        return math.inf, 0.0, 0.0
+    omega, twice = 2.0 * math.pi * table.frequency, 2.0 * table.damping_ratio
+    return effects.velocity_limit, omega / twice, twice * omega
+
+
+def coupling(damper: Damper, effects: DamperEffects) -> tuple[float, float, float, float, float]:
+    """What `limits` holds of a mass behind a coupling, from place `SECOND` on."""
+    if math.isinf(effects.second_frequency):
+        return 0.0, 0.0, 0.0, 0.0, 1.0
+    omega, share = 2.0 * math.pi * effects.second_frequency, effects.second_mass
+    damped, half = 2.0 * effects.second_damping * omega, 0.5 * effects.second_play
+    return share * damper.mass, omega**2, damped, half, 1.0 / (1.0 - share)
+
+
 @jit
 def enter(lab: tuple[Any, ...], command: float, motor_command: float) -> tuple[float, float, float, float]:
     """`advance` for a caller outside compiled code, which holds the laboratory as `compiled.plain` gives it."""
@@ -161,7 +189,7 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
     before, after, motor, rail, drag = size, size + 1, size + 2, size + 3, size + 4
     played, last = size + INPUTS + PLAYED, size + INPUTS + LAST_VELOCITY
     start = state[TABLE]
-    present, apart = limits[PRESENT] != 0.0, 0.0
+    present, apart, speed = limits[PRESENT] != 0.0, 0.0, 0.0
     state[motor] = motor_command
     state[rail] = 0.0
     state[drag] = 0.0
@@ -184,6 +212,7 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
                 state[after] = state[played]
         carry(columns[i], state, free)
         if present:
+            speed = state[STROKE_RATE] + state[TABLE_RATE]
             resist(columns[i], lab, lab.lengths[i])
             if limits[BEHIND] > 0.0:
                 apart = within_play(columns[i], limits, state, free, lab.lengths[i])
@@ -191,12 +220,14 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
                 carry(columns[i], state, free)
         for row in range(size):
             state[row] = with_forces(columns[i], state, free, row)
+        follow(limits, state, size, state[STROKE_RATE] + state[TABLE_RATE] - speed, lab.lengths[i])
         put_back(limits, state, apart)
     if limits[IDEAL] > 0.0:  # its velocity has steps, so the acceleration is the mean over the interval
         velocity = (state[TABLE] - start) / limits[IDEAL]
         state[ACCELERATION] = (velocity - state[last]) / limits[IDEAL]
         state[last] = velocity
     force = spring[0] * state[STROKE] + spring[1] * state[STROKE_RATE] + state[rail] - state[MOTOR]
+    force += state[size + INPUTS + HELD]  # which acts between the two masses
     return state[TABLE], state[ACCELERATION], state[STROKE], force
 
 
@@ -275,9 +306,17 @@ def resist(columns: Array, lab: TableLab, length: float) -> None:
             limits[STOP_EXPONENT],
             limits[STOP_DAMPING],
         )
+    if limits[ASYMMETRY] != 0.0:
+        rate = 0.5 * (state[STROKE_RATE] + with_forces(columns, state, lab.free, STROKE_RATE))
+        state[rail] += limits[ASYMMETRY] * lab.spring[1] * abs(rate)
+    if limits[SECOND] > 0.0:
+        state[size + INPUTS + HELD] = coupled(limits, state, size, length)
+        state[rail] -= state[size + INPUTS + HELD]
     if lab.learned.size > 0:
         state[rail] += preisach.step(lab.learned, lab.learned_memory, middle, state[STROKE_RATE])
     base = BASE_RATE if size > BASE else TABLE_RATE
+    if limits[FASTEST] < math.inf:
+        state[drag] += throttled(limits, state, size, base, length)
     if lab.braked.size > 0:
         place = state[base - 1] + 0.5 * columns[base, base - 1] * state[base]
         state[drag] -= preisach.step(lab.braked, lab.braked_memory, place, state[base])
@@ -294,6 +333,41 @@ def resist(columns: Array, lab: TableLab, length: float) -> None:
             state[rail] += state[place]
         else:
             state[rail] += stopping(columns, lab, STROKE_RATE, rail, least, most)
+
+
+@jit
+def throttled(limits: Array, state: Array, size: int, base: int, length: float) -> float:
+    """Acceleration (m/s²) that the table's loop lacks as its valve opens so far only, at the middle of a segment."""
+    command = 0.5 * (state[size] + state[size + 1])
+    wanted = limits[OPENING] * (command - state[base - 1] - 0.5 * length * state[base])
+    return float(limits[VALVE] * (min(max(wanted, -limits[FASTEST]), limits[FASTEST]) - wanted))
+
+
+@jit
+def coupled(limits: Array, state: Array, size: int, length: float) -> float:
+    """Force (N) of the coupling on the first mass at the middle of a segment; on a flank of its play it only pushes."""
+    rate = state[size + INPUTS + APART_RATE]
+    ahead = state[size + INPUTS + APART] + 0.5 * length * rate
+    # of a strong dashpot as if it acted on the rate at the segment's end, so that it never turns the motion around
+    damped = limits[COUPLED_RATE] / (1.0 + 0.5 * length * limits[COUPLED_RATE] * limits[WHOLE])
+    if limits[GAP] == 0.0:
+        return float(limits[SECOND] * (limits[COUPLING] * ahead + damped * rate))
+    bent = ahead - min(max(ahead, -limits[GAP]), limits[GAP])
+    if bent == 0.0:
+        return 0.0
+    force = limits[SECOND] * (limits[COUPLING] * bent + damped * rate)
+    return float(max(force, 0.0) if bent > 0.0 else min(force, 0.0))
+
+
+@jit
+def follow(limits: Array, state: Array, size: int, gained: float, length: float) -> None:
+    """Move the mass behind the coupling over a segment in which the first one has gained a speed (m/s)."""
+    if limits[SECOND] == 0.0:
+        return
+    place, rate = size + INPUTS + APART, size + INPUTS + APART_RATE
+    state[place] += 0.5 * length * state[rate]
+    state[rate] -= gained + length * state[size + INPUTS + HELD] / limits[SECOND]
+    state[place] += 0.5 * length * state[rate]
 
 
 @jit

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
-from report.text.text_form import UNSTATED, StatedForm, TextForm, is_number, recognised
+from report.text.text_form import SPACES, UNSTATED, StatedForm, TextForm, is_number, recognised, split
 
 Columns = dict[str, NDArray[np.float64]]
 
@@ -68,7 +68,7 @@ def _read_text(path: Path, stated: StatedForm) -> DataTable:
     form = recognised(path, encoding, stated)
     units = _units(path, form, encoding)
     table = arrow.read_csv(
-        path,
+        _single_spaced(path, encoding) if form.separator == SPACES else path,
         arrow.ReadOptions(
             skip_rows=form.skip_rows, skip_rows_after_names=1 if units else 0, encoding=encoding
         ),
@@ -77,6 +77,12 @@ def _read_text(path: Path, stated: StatedForm) -> DataTable:
     )
     columns = _numeric(table)
     return DataTable(columns, {name: unit for name, unit in units.items() if name in columns and unit}, form)
+
+
+def _single_spaced(path: Path, encoding: str) -> io.BytesIO:
+    """The text with one space between columns and none at either end of a line."""
+    with path.open(encoding=encoding) as stream:
+        return io.BytesIO("\n".join(SPACES.join(line.split()) for line in stream).encode(encoding))
 
 
 def _encoding(path: Path) -> str:
@@ -92,8 +98,8 @@ def _encoding(path: Path) -> str:
 def _units(path: Path, form: TextForm, encoding: str) -> dict[str, str]:
     """The row below the names where it holds texts and no number, by name: a row of units; empty where it is data."""
     with path.open(encoding=f"{encoding}-sig" if encoding == "utf-8" else encoding, newline="") as stream:
-        text = "".join(itertools.islice(stream, form.skip_rows, form.skip_rows + 2))
-    rows = list(csv.reader(io.StringIO(text), delimiter=form.separator))
+        lines = list(itertools.islice(stream, form.skip_rows, form.skip_rows + 2))
+    rows = split(lines, form.separator)
     if len(rows) < 2 or not any(cell.strip() for cell in rows[1]):
         return {}
     if any(is_number(cell, form.decimal) for cell in rows[1]):

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-SEPARATORS = (",", ";", "\t")
+SPACES = " "  # a separator of any number of spaces, as in columns that are printed below each other
+SEPARATORS = (",", ";", "\t", SPACES)
 DECIMALS = (".", ",")
 LOOKED_AT = 200  # rows in which a form is recognised: a preamble of a logger has some tens
 
@@ -54,6 +55,8 @@ def recognised(path: Path, encoding: str, stated: StatedForm) -> TextForm:
 
 def split(lines: Sequence[str], separator: str) -> Rows:
     """The cells of each line."""
+    if separator == SPACES:
+        return [line.split() for line in lines]
     return list(csv.reader(io.StringIO("".join(lines)), delimiter=separator))
 
 

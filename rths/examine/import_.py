@@ -86,7 +86,7 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: Tex
     say(f"{args.output}: {found.t.size} {rows}; signals: {', '.join(present)}\n")
     say(f"absent: {', '.join(absent) or 'none'}\n")
     if form and form != TextForm():
-        between = "tabs" if form.separator == "\t" else f"'{form.separator}'"
+        between = {"\t": "tabs", " ": "spaces"}.get(form.separator, f"'{form.separator}'")
         say(
             f"text: {between} between columns, decimal sign '{form.decimal}', {form.skip_rows} rows above the names\n"
         )

@@ -11,7 +11,7 @@ from common.roles import MASTER
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.nuisances import Nuisance
-from diagnosis.recorded.parts import ColumnAlone, Part
+from diagnosis.recorded.parts import ColumnAlone, Measured, Part
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect
 from loop import replay
@@ -38,7 +38,7 @@ def slider(x: Array) -> Array:
     return result
 
 
-class MadeSpecimen:
+class MadeSpecimen(Measured):
     """A column alone, whose forces follow another law than the catalogue's first one."""
 
     name, role, exact = "column", MASTER, False

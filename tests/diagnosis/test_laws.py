@@ -18,7 +18,7 @@ from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import alone, simplest
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.nuisances import Nuisance
-from diagnosis.recorded.parts import ColumnAlone, Part
+from diagnosis.recorded.parts import ColumnAlone, Measured, Part
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect, Parameter
 from laboratories.table.kind import TABLE
@@ -200,7 +200,7 @@ def test_an_effect_whose_left_out_shape_does_what_a_second_effect_does_stands_al
     assert simplest([both, one])[0] is one
 
 
-class RubbingDamper:
+class RubbingDamper(Measured):
     """A damper on a standing table whose carriage bends bristles before it slides, in 50 µs steps of its equation."""
 
     name, role, exact = "laboratory B", "slave", False
@@ -225,9 +225,9 @@ class RubbingDamper:
                 stroke += h * rate
                 rubbing += h * (self.FORCE * rate - abs(rate) * rubbing) / self.PRESLIDING
             rows.append((stroke, damper.stiffness * stroke + damper.damping * rate + rubbing - motor))
-        self.level = np.array([2e-6, 0.02])
+        self.noise = np.array([2e-6, 0.02])
         noise = np.random.default_rng(3).standard_normal((self.TICKS, 2))
-        self.measured = np.array(rows) + self.level * noise
+        self.measured = np.array(rows) + self.noise * noise
         self.present = np.ones((self.TICKS, 2), dtype=bool)
 
     def predict(self, system: System) -> Array:
@@ -240,7 +240,8 @@ class RubbingDamper:
 def test_friction_with_presliding_is_found_with_its_distance() -> None:
     part = RubbingDamper()
     group, train = residuals.withheld(part.TICKS, INTERVAL)
-    data = Data(part, System(Plan()), part.level, part.level, group, train, np.zeros(2))
+    bare = Data(part, System(Plan()), part.noise, part.noise, group, train, np.zeros(2))
+    data = residuals.measured_by(bare, part.noise)
     before = fitting.fit(data, {"damper.friction": {"force": 2.0, "velocity": 1e-6}})
     (found,) = in_best_laws([before])
     values = found.values["damper.friction"]
@@ -250,7 +251,7 @@ def test_friction_with_presliding_is_found_with_its_distance() -> None:
     assert fitting.excess(found) < 0.1 * fitting.excess(before)
 
 
-class LooseTable:
+class LooseTable(Measured):
     """A table whose platform has play against its loop, in 20 µs steps of its equation; it carries no damper."""
 
     name, role, exact = "laboratory B", "slave", False
@@ -280,9 +281,9 @@ class LooseTable:
             place += h * rate
             if step % self.STEPS == 0:
                 rows.append(place)
-        self.level = np.array([5e-6])
+        self.noise = np.array([5e-6])
         noise = np.random.default_rng(5).standard_normal(self.TICKS)
-        self.measured = (np.array(rows) + self.level * noise)[:, None]
+        self.measured = (np.array(rows) + self.noise * noise)[:, None]
         self.present = np.ones((self.TICKS, 1), dtype=bool)
 
     def predict(self, system: System) -> Array:
@@ -295,7 +296,7 @@ class LooseTable:
 def test_play_behind_the_tables_loop_is_told_from_play_before_it() -> None:
     part = LooseTable()
     group, train = residuals.withheld(part.TICKS, INTERVAL)
-    data = Data(part, System(Plan()), part.level, part.level, group, train, np.zeros(1))
+    data = Data(part, System(Plan()), part.noise, part.noise, group, train, np.zeros(1))
     before = fitting.fit(data, {"table.backlash": {"width": 4e-4}})
     (found,) = in_best_laws([before])
     values = found.values["table.backlash"]

@@ -88,6 +88,13 @@ def test_a_filter_that_nobody_stated_is_no_effect_and_is_said(cases: Cases) -> N
     assert found.logger["column_force"][0] == pytest.approx(FILTERED, abs=1e-3)
 
 
+def test_a_gain_of_all_channels_within_their_calibration_is_said(cases: Cases) -> None:
+    found = examine(imported(cases.record(), lambda read: 1.012 * read))
+    told = [text for text in found.warnings if text.startswith("The readings")]
+    assert any("1.2 % larger than the plan says" in text for text in told)
+    assert not any("larger" in text for text in examine(imported(cases.record())).warnings)
+
+
 def test_a_hum_far_above_the_noise_is_no_gap(cases: Cases) -> None:
     found = examine(imported(cases.record(), hum))
     assert set(outcomes(found).values()) <= {"none", "tolerances"}

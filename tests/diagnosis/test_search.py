@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from diagnosis.fits import candidates, fitting, residuals, unexplained, worth
+from diagnosis.fits.fitting import Fit
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, likeliest, search, together, trimmed
 from laboratories.effects import CATALOGUE
 from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, lab_b, named, white
+from tests.diagnosis.test_equivalents import DATA, NOISY
 
 # play behind the loop, of which the law of play before the loop promises nothing
 PLAYED = {"width": 1.5e-4, "contact": 200.0, "flank": 0.7, "guide": 628.0, "law": 1.0}
@@ -189,7 +191,10 @@ def test_a_play_that_swallows_most_of_a_small_motion_is_found(cases: Cases, effe
     assert estimate(report, effect, "width") == pytest.approx(width, rel=0.05)
 
 
-def test_an_effect_that_is_small_beside_another_is_named_where_both_leave_only_noise(cases: Cases) -> None:
+def test_an_effect_that_is_small_beside_another_is_named_where_both_leave_only_noise(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worth, "moving", fitting.excess)  # as if the constant force were none
     effects = {"damper.offset": {"force": 40.0}, "table.gain": {"factor": 0.99}}
     found = cases.record(effects, duration=8.0)
     part = lab_b(found)
@@ -211,7 +216,8 @@ def test_a_faint_rest_is_not_filled_up_with_effects(
     one, two = SimpleNamespace(names=("a",), prior=0.0), SimpleNamespace(names=("a", "b"), prior=0.0)
     left = {one.names: before, two.names: after}
     monkeypatch.setattr("diagnosis.fits.search.remaining", lambda fit: left[fit.names])
-    monkeypatch.setattr("diagnosis.fits.search.leaves", lambda fit: fit is one)
+    monkeypatch.setattr("diagnosis.fits.search.leaves", lambda fit, _: fit is one)
+    monkeypatch.setattr("diagnosis.fits.search.model_error", lambda _: 0.0)
     monkeypatch.setattr("diagnosis.fits.search.excess", lambda fit: 1e3 * left[fit.names] ** 4)
     monkeypatch.setattr(candidates, "best_laws", lambda *_: [two])
     monkeypatch.setattr(candidates, "without", lambda *_: one)
@@ -224,9 +230,42 @@ def test_an_effect_that_leaves_hardly_anything_is_worth_it_however_large_the_who
 ) -> None:
     excess = {"bare": 2e9, "one": 9e5, "two": left}
     monkeypatch.setattr(worth, "excess", lambda fit: excess[fit.name])
+    monkeypatch.setattr(worth, "moving", lambda fit: excess[fit.name])
     monkeypatch.setattr(worth, "remaining", lambda _: 2.0 * worth.LOUD)
     bare, one, two = (SimpleNamespace(name=name, data=SimpleNamespace(energy=4e9)) for name in excess)
     assert worth.refines(bare, one, two) is refines  # type: ignore[arg-type]
+
+
+def test_a_reading_that_is_off_by_a_constant_is_no_gap_beside_which_others_are_small() -> None:
+    off = Fit(DATA, {}, np.zeros(0), NOISY + 30.0)
+    moved = Fit(DATA, {}, np.zeros(0), NOISY + 3.0 * np.sin(0.2 * np.arange(DATA.groups))[:, None])
+    assert worth.moving(off) < 0.01 * fitting.excess(off)
+    assert worth.moving(moved) > 0.95 * fitting.excess(moved)
+
+
+def test_a_signal_that_was_not_recorded_does_not_pay_for_what_another_leaves(cases: Cases) -> None:
+    whole = cases.record()
+    part = lab_b(whole)
+    missing = {"damper_stroke", "damper_force"}
+    kept = np.array([name not in missing for name in part.signals])
+    half = part.replaced(present=part.present & kept)
+    data = residuals.prepare(half, whole)
+    left = Fit(data, {}, np.zeros(0), np.where(kept, 1.3, 0.0) * np.ones((data.groups, 1)))
+    assert data.size == 2 * data.groups
+    assert fitting.excess(left) == pytest.approx((1.3**2 - 1.0) * data.size)
+
+
+@pytest.mark.parametrize(("z", "left", "worthy"), [(3.0, 0.3, True), (3.0, 0.7, False), (0.5, 0.3, False)])
+def test_an_effect_that_brings_nominal_parameters_back_may_explain_less(
+    monkeypatch: pytest.MonkeyPatch, z: float, left: float, worthy: bool
+) -> None:
+    monkeypatch.setattr(worth, "changes", lambda fit: [np.array([1e3 * fit.data.group])])
+    monkeypatch.setattr(worth, "cancelling", lambda *_: False)
+    gap = np.sin(0.2 * np.arange(DATA.groups))[:, None]
+    bare = Fit(DATA, {}, np.zeros(1), NOISY + 1e4 * gap)
+    before = Fit(DATA, {"a": {}}, np.array([z]), NOISY + 20.0 * gap)
+    after = Fit(DATA, {"a": {}, "b": {}}, np.zeros(1), NOISY + 20.0 * np.sqrt(left) * gap)
+    assert worth.is_worth(bare, before, after) is worthy
 
 
 def test_a_far_likelier_exchange_of_one_effect_stands_in_front(cases: Cases) -> None:

@@ -119,6 +119,12 @@ def test_files_with_semicolons_decimal_commas_a_preamble_and_a_row_of_units_are_
         ("Run;7;;\nDate;1.2.2024;;\nt;u;;\ns;mm;;\n0;1,5;;\n1;2,5;;\n", TextForm(";", ",", 2), ["t", "u"]),
         ("Bench,A\nt,u\n0,1\n1,2\n", TextForm(skip_rows=1), ["t", "u"]),  # by the names that are looked for
         ("t,u\n0,\n1,2\n2,\n", TextForm(), ["t", "u"]),
+        ("t u\n0.0 1.5\n0.1 2.5\n", TextForm(" "), ["t", "u"]),
+        (
+            "Run 7\n    t      u\n    s     mm\n  0,0   10,5\n  0,1   -2,5\n",
+            TextForm(" ", ",", 1),
+            ["t", "u"],
+        ),
     ],
 )
 def test_the_form_of_a_text_file_is_recognised(

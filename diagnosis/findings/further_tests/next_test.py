@@ -54,7 +54,7 @@ def choices(found: Diagnosis) -> list[ChosenTest]:
         for other in search.alternatives[:MOST]:
             pair = exchanged_pair(search.chosen, other)
             close = (other.cost - search.chosen.cost) < OPEN * max(
-                1.0, search.chosen.chi / search.chosen.reduced.size
+                1.0, search.chosen.chi / search.chosen.data.size
             )
             if pair is not None and close:
                 result += [ChosenTest(name, value, pair) for name, value in separations(search, other)]

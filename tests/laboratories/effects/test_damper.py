@@ -199,6 +199,60 @@ def test_a_constant_force_deflects_the_damper_as_in_statics(force: float) -> Non
 FREE = Damper(mass=16.0, stiffness=0.0, damping=0.0)
 
 
+def test_a_dashpot_that_is_stronger_in_one_direction_has_two_final_speeds() -> None:
+    damper = Damper(mass=16.0, stiffness=0.0, damping=100.0)
+    for push, expected in ((30.0, 30.0 / 130.0), (-30.0, -30.0 / 70.0)):
+        got = run_b(
+            np.zeros(2000), np.full(2000, push), damper=damper, damper_effects=DamperEffects(asymmetry=0.3)
+        )
+        assert got[-1, STROKE_RATE] == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("play", [0.0, 4e-4])
+def test_two_masses_with_a_coupling_move_as_another_solver_says(play: float) -> None:
+    """On a table that moves, with spring and dashpot, so that all forces act on both masses as they should."""
+    share, frequency, damping, pace = 0.3, 6.0, 0.1, 2.0 * math.pi * 3.0
+    damper = Damper(mass=16.0, stiffness=900.0, damping=20.0, motor_time_constant=0.0)
+    first, second = (1.0 - share) * 16.0, share * 16.0
+    omega = 2.0 * math.pi * frequency
+
+    def coupled(x: Array) -> float:
+        ahead = x[2] - x[0]
+        bent = ahead - min(max(ahead, -0.5 * play), 0.5 * play)
+        force = second * (omega**2 * bent + 2.0 * damping * omega * (x[3] - x[1]))
+        if play == 0.0:
+            return force
+        return 0.0 if bent == 0.0 else max(force, 0.0) if bent > 0.0 else min(force, 0.0)
+
+    def rates(t: float, x: Array) -> list[float]:  # stroke, rate, of both masses over the table
+        ground, force = -2.0 * (pace**2) * 1e-3 * math.sin(pace * t), coupled(x)
+        push = 15.0 * math.sin(1.7 * pace * t)
+        on_first = push - 900.0 * x[0] - 20.0 * x[1] + force
+        return [x[1], on_first / first - ground, x[3], -force / second - ground]
+
+    t = np.arange(1, 8001) * SHORT
+    table = ShakingTable(delay=0.0, frequency=2000.0)
+    got = run_b(
+        2e-3 * np.sin(pace * t),
+        15.0 * np.sin(1.7 * pace * (t - 0.5 * SHORT)),
+        table=table,
+        damper=damper,
+        interval=SHORT,
+        damper_effects=DamperEffects(
+            second_mass=share, second_frequency=frequency, second_damping=damping, second_play=play
+        ),
+    )
+    start = [0.0, -2e-3 * pace, 0.0, -2e-3 * pace]  # at rest in space
+    found = solve_ivp(rates, (0.0, t[-1]), start, t_eval=t, max_step=2e-4, rtol=1e-9, atol=1e-12)
+    assert np.max(np.abs(got[:, STROKE] - found.y[0])) < 5e-3 * np.max(np.abs(found.y[0]))
+    rigid = run_b(
+        2e-3 * np.sin(pace * t), 15.0 * np.sin(1.7 * pace * t), table=table, damper=damper, interval=SHORT
+    )
+    assert np.max(np.abs(rigid[:, STROKE] - found.y[0])) > 0.05 * np.max(np.abs(found.y[0]))
+    force = 900.0 * found.y[0] + 20.0 * found.y[1] - 15.0 * np.sin(1.7 * pace * t)
+    assert np.max(np.abs(got[200:, FORCE] - force[200:])) < 0.02 * np.max(np.abs(force))
+
+
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 @pytest.mark.parametrize(("stiffness", "tolerance"), [(500.0, 0.005), (2000.0, 0.005), (20000.0, 0.016)])
 def test_the_end_stop_acts_as_an_elastic_spring(stiffness: float, tolerance: float, direction: float) -> None:

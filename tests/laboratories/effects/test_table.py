@@ -59,6 +59,41 @@ def test_gain_and_oil_column_have_their_transfer_functions(
     assert phasor(got[:, ACCELERATION], t, frequency, 4.0) == pytest.approx(s**2 * found, rel=2e-2)
 
 
+@pytest.mark.parametrize("frequency", [2.0, 9.0, 14.0])
+@pytest.mark.parametrize("share", [0.06, 0.5])
+def test_a_share_of_the_motion_passes_through_the_oil_column(frequency: float, share: float) -> None:
+    t = np.arange(1, 4001) * DT
+    command = 5e-3 * np.cos(2.0 * np.pi * frequency * t) * np.minimum(t, 1.0)
+    got = run_b(
+        command,
+        damper=STILL,
+        table_effects=TableEffects(oil_frequency=17.0, oil_damping=0.1, oil_share=share),
+    )
+    s = 2j * math.pi * frequency
+    whole = 1.0 - share + share * second_order(s, 17.0, 0.1)
+    expected = np.exp(-0.004 * s) * second_order(s, 15.0, 0.7) * whole * 5e-3 * np.sinc(frequency * DT) ** 2
+    found = phasor(got[:, Y], t, frequency, 4.0)
+    assert abs(found - expected) < 2e-3 * abs(expected)
+    assert phasor(got[:, ACCELERATION], t, frequency, 4.0) == pytest.approx(s**2 * found, rel=2e-2)
+
+
+def test_a_table_whose_valve_saturates_follows_as_another_solver_says() -> None:
+    limit, omega, ratio, size, pace = 0.04, 2.0 * math.pi * 15.0, 0.7, 0.01, 2.0 * math.pi * 1.5
+
+    def rates(t: float, x: Array) -> list[float]:
+        wanted = omega / (2.0 * ratio) * (size * math.sin(pace * t) - x[0])
+        return [x[1], 2.0 * ratio * omega * (min(max(wanted, -limit), limit) - x[1])]
+
+    t = np.arange(1, 6001) * SHORT
+    table = ShakingTable(delay=0.0)
+    more = TableEffects(velocity_limit=limit)
+    got = run_b(size * np.sin(pace * t), table=table, damper=STILL, table_effects=more, interval=SHORT)
+    expected = solve_ivp(rates, (0.0, t[-1]), [0.0, 0.0], t_eval=t, max_step=1e-3, rtol=1e-8, atol=1e-12)
+    assert np.max(np.abs(expected.y[1])) > 0.99 * limit  # it does saturate
+    assert np.max(np.abs(got[:, Y] - expected.y[0])) < 2e-3 * np.max(np.abs(expected.y[0]))
+    assert np.max(np.abs(got[:, RATE])) < 1.005 * limit
+
+
 QUICK = ShakingTable(delay=0.0, frequency=2000.0)  # its loop follows the command
 
 

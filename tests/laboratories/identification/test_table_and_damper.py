@@ -60,7 +60,16 @@ def test_the_tables_parameters_are_found(frequency: float, ratio: float, lag: fl
     assert fit["damping_ratio"].value == pytest.approx(ratio, rel=0.01)
     assert fit["delay"].value == pytest.approx(lag, abs=2e-4)
     assert fit.nrmse < 0.05
-    assert [fit[name].unit for name in table.NAMES] == ["Hz", "", "s"]
+    assert [fit[name].unit for name in table.NAMES] == ["Hz", "", "s", ""]
+
+
+def test_an_error_of_a_tables_calibration_is_no_slower_loop() -> None:
+    command = tones(3000, 0.3, 8.0, 0.01, seed=5)
+    moved = 1.012 * emulated(command, np.zeros(3000))[0] + 1e-4
+    fit = table.least_squares(command, moved, DT)
+    assert fit["gain"].value == pytest.approx(1.012, abs=1e-4)
+    assert fit["frequency"].value == pytest.approx(15.0, rel=1e-3)
+    assert fit["delay"].value == pytest.approx(0.004, abs=1e-5)
 
 
 def test_the_table_agrees_with_the_continuous_equation() -> None:

@@ -131,6 +131,7 @@ CASES: dict[str, tuple[dict[str, float], dict[str, float], set[str]]] = {
     "column.slip": ({"gap": 3e-4}, {"gap": 1e-9}, A),
     "table.delay": ({"delay": 0.008}, {"delay": 1e-6}, set()),
     "table.bandwidth": ({"factor": 0.7}, {"factor": 0.99999}, set()),
+    "table.damping": ({"factor": 1.3}, {"factor": 1.00001}, set()),
     "table.gain": ({"factor": 1.1}, {"factor": 1.00001}, set()),
     "table.oil_column": ({"frequency": 20.0}, {"frequency": 4000.0, "damping": 0.3}, set()),
     "table.payload": ({"compliance": 1e-5}, {"compliance": 1e-13}, set()),
@@ -140,6 +141,7 @@ CASES: dict[str, tuple[dict[str, float], dict[str, float], set[str]]] = {
     "damper.viscous": ({"factor": 1.5}, {"factor": 1.00001}, TABLE_ONLY),
     "damper.stiffness": ({"factor": 1.5}, {"factor": 1.00001}, TABLE_ONLY),
     "damper.mass": ({"factor": 1.1}, {"factor": 1.00001}, TABLE_ONLY),
+    "damper.second_mass": ({"frequency": 3.0}, {"frequency": 300.0, "share": 0.005}, TABLE_ONLY),
     "damper.gain": ({"factor": 1.1}, {"factor": 1.00001}, TABLE_ONLY),
     "damper.motor_lag": ({"time_constant": 0.01}, {"time_constant": 1e-8}, TABLE_ONLY),
     "damper.force_limit": ({"force": 40.0}, {"force": 1e5}, TABLE_ONLY),
@@ -162,7 +164,6 @@ CASES: dict[str, tuple[dict[str, float], dict[str, float], set[str]]] = {
     "x.damper.cable_drag": ({"coefficient": 15.0}, {"coefficient": 1e-4}, TABLE_ONLY),
     "x.damper.motor_constant": ({"rise": 0.3}, {"rise": 1e-6}, TABLE_ONLY),
     "x.damper.cubic_spring": ({"stiffness": 8e4}, {"stiffness": 0.1}, TABLE_ONLY),
-    "x.damper.appendage": ({"mass": 1.0, "frequency": 3.0}, {"mass": 1e-6, "frequency": 3.0}, TABLE_ONLY),
 }
 KNOWN = {**KNOWN_A, **KNOWN_B}
 FORMS = [(name, formula) for name in CASES for formula in KNOWN[name].formulas]

@@ -46,11 +46,13 @@ PLAIN: tuple[str, ...] = (
     "column.stiffness",
     "column.inertia",
     "table.bandwidth",
+    "table.damping",
     "table.gain",
     "table.oil_column",
     "damper.viscous",
     "damper.stiffness",
     "damper.mass",
+    "damper.second_mass",
     "damper.gain",
     "damper.motor_lag",
     *(
@@ -71,7 +73,6 @@ UNCATALOGUED: dict[str, tuple[str, tuple[str, ...], tuple[tuple[float, float], .
     "x.damper.cable_drag": ("damper", ("coefficient",), ((1.5, 20.0),)),
     "x.damper.motor_constant": ("damper", ("rise",), ((0.02, 0.3),)),
     "x.damper.cubic_spring": ("damper", ("stiffness",), ((5e3, 8e4),)),
-    "x.damper.appendage": ("damper", ("mass", "frequency"), ((0.15, 2.0), (8.0, 2.5))),
     "x.sensor.table_acceleration.crosstalk": (
         "sensor.table_acceleration",
         ("coefficient",),

@@ -19,6 +19,11 @@ def bandwidth(values: Values, *, factor: float) -> None:
     values["omega"] *= factor
 
 
+def table_damping(values: Values, *, factor: float) -> None:
+    """Loop damped more or less: `factor·ζ`."""
+    values["damping"] *= factor
+
+
 def table_gain(values: Values, *, factor: float) -> None:
     """Calibration of the loop: `factor·u`."""
     values["table_gain"] *= factor
@@ -109,14 +114,20 @@ def cubic_spring(values: Values, *, stiffness: float) -> None:
     values["cubic"] = stiffness
 
 
-def appendage(values: Values, *, mass: float, frequency: float) -> None:
-    """Loose part on the moving mass: kg, and Hz on its spring."""
-    values |= {"appendage": mass, "appendage_omega": 2.0 * math.pi * frequency}
+def second_mass(values: Values, *, frequency: float, share: float = 0.2, damping: float = 0.1) -> None:
+    """A share of the moving mass on a spring of its own: frequency (Hz) and damping ratio there."""
+    values |= {
+        "appendage": share * values["mass"],
+        "mass": (1.0 - share) * values["mass"],
+        "appendage_omega": 2.0 * math.pi * frequency,
+        "appendage_damping": damping,
+    }
 
 
 KNOWN = {
     "table.delay": KnownEffect(table_delay, {"pade": 0}),
     "table.bandwidth": KnownEffect(bandwidth, PLAIN),
+    "table.damping": KnownEffect(table_damping, PLAIN),
     "table.gain": KnownEffect(table_gain, PLAIN),
     "table.oil_column": KnownEffect(oil_column, PLAIN),
     "table.payload": KnownEffect(payload, {"dynamic": 0}),
@@ -128,6 +139,7 @@ KNOWN = {
     "damper.viscous": KnownEffect(dashpot, PLAIN),
     "damper.stiffness": KnownEffect(spring, PLAIN),
     "damper.mass": KnownEffect(mass, PLAIN),
+    "damper.second_mass": KnownEffect(second_mass, PLAIN),
     "damper.gain": KnownEffect(motor_gain, PLAIN),
     "damper.motor_lag": KnownEffect(motor_lag, PLAIN),
     "damper.force_limit": KnownEffect(force_limit, {"smooth": 0}),
@@ -139,5 +151,4 @@ KNOWN = {
     "x.damper.cable_drag": KnownEffect(cable_drag, PLAIN),
     "x.damper.motor_constant": KnownEffect(motor_constant, PLAIN),
     "x.damper.cubic_spring": KnownEffect(cubic_spring, PLAIN),
-    "x.damper.appendage": KnownEffect(appendage, PLAIN),
 }

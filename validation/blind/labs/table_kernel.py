@@ -18,7 +18,7 @@ STICKING = 5e-3  # scale of the rail's Stribeck effect
 PRESLIDING = 20e-6
 # S, damping of the bristles over Coulomb friction, times their presliding: damped within a fraction of an interval.
 MICRO = 0.5e-3
-PITCH_DAMPING, APPENDAGE_DAMPING = 0.05, 0.03  # ratios of bolted and of loose steel parts
+PITCH_DAMPING = 0.05  # ratio of bolted steel parts
 
 # places in `state`: table loop, stroke, motor, platform, pitch, appendage; each with its rate
 LOOP, LOOP_RATE, STROKE, STROKE_RATE, MOTOR, PLATE, PLATE_RATE = range(7)
@@ -74,6 +74,7 @@ class TrueTable(NamedTuple):
     cubic: float = 0.0  # N/m³
     appendage: float = 0.0  # kg
     appendage_omega: float = 10.0  # rad/s
+    appendage_damping: float = 0.1  # ratio
 
 
 @jit
@@ -130,7 +131,8 @@ def rates(
     if p.table_friction > 0.0:
         loop -= p.table_friction * friction.regularised(x[LOOP_RATE], RUBBING)
     plate = platform(p, x, loop)
-    loose = p.appendage_omega**2 * x[LOOSE] + 2.0 * APPENDAGE_DAMPING * p.appendage_omega * x[LOOSE_RATE]
+    loose = p.appendage_omega**2 * x[LOOSE]
+    loose += 2.0 * p.appendage_damping * p.appendage_omega * x[LOOSE_RATE]
     mass = (p.appendage * loose - force) / p.mass  # absolute acceleration of the damper
     dx[LOOP], dx[LOOP_RATE] = x[LOOP_RATE], loop
     dx[PLATE], dx[PLATE_RATE] = (x[PLATE_RATE], plate) if p.oil + p.play > 0.0 else (x[LOOP_RATE], loop)

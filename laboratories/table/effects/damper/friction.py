@@ -9,7 +9,9 @@ parameter `law` chooses another formula:
 
             dF/ds = (force·sgn(ds) − F)/presliding
 
-        so that the force of a carriage turned around reaches its size only over a few times that distance
+        so that the force of a carriage turned around reaches its size only over a few times that distance; F may depend
+        on direction
+    3   the same with F by direction and speed
 
 Not to be confused with `damper.viscous`, whose force grows with speed: presliding depends on the way since the last
 reversal alone.
@@ -33,8 +35,9 @@ EFFECT = sets(
     further=FURTHER
     | {
         "": which_law(
-            2.0,
-            "0 the same in both directions and at all speeds, 1 by direction and speed, 2 with presliding",
+            3.0,
+            "0 the same in both directions and at all speeds, 1 by direction and speed, 2 by direction and with "
+            "presliding, 3 all of it",
         ),
         "presliding": Parameter(
             "presliding",
@@ -43,11 +46,19 @@ EFFECT = sets(
             least=1e-6,
             most=0.005,
             sizes=(3e-05, 0.0005),
-            says="distance over which the force of law 2 approaches its size after a reversal",
+            says="distance over which the force of laws 2 and 3 approaches its size after a reversal",
             shape=True,
         ),
     },
-    laws=(*laws(COULOMB), Law("with presliding", {"presliding": 1e-4}, fixed=COULOMB)),
+    laws=(
+        *laws(COULOMB),
+        Law("with presliding", {"presliding": 1e-4, "asymmetry": 0.0}, fixed=COULOMB),
+        Law(
+            "by direction and speed, with presliding",
+            {"presliding": 1e-4, "asymmetry": 0.0, "drop": 0.1, "speed": 0.02},
+            fixed=COULOMB,
+        ),
+    ),
     says="Coulomb friction of the guide rail",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",
 )

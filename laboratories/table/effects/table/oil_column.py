@@ -2,6 +2,11 @@
 
     Y(s) = ω_o²/(s² + 2ζ_o·ω_o·s + ω_o²)·Y_loop(s),    ω_o = 2π·frequency, ζ_o = damping
 
+A loop that measures the platform itself, or its pressure, leaves a part of the resonance only; so do a specimen that
+swings on the platform, and the foundation. The parameter `law` chooses that formula:
+
+    1   Y(s) = (1 − share + share·ω_o²/(s² + 2ζ_o·ω_o·s + ω_o²))·Y_loop(s)
+
 Not to be confused with `table.bandwidth`: the resonance raises amplitudes near its own frequency.
 """
 
@@ -9,8 +14,8 @@ from __future__ import annotations
 
 import math
 
-from laboratories.effects.effect import Parameter
-from laboratories.effects.laws import sets
+from laboratories.effects.effect import Law, Parameter
+from laboratories.effects.laws import sets, which_law
 
 EFFECT = sets(
     "table",
@@ -30,6 +35,23 @@ EFFECT = sets(
             shape=True,
         ),
     },
+    further={
+        "": which_law(1.0, "0 the whole motion passes through the resonance, 1 a share of it"),
+        "oil_share": Parameter(
+            "share",
+            "",
+            null=1.0,
+            least=0.001,
+            most=1.0,
+            sizes=(0.03, 0.1, 0.3),
+            says="of the motion that passes through the resonance of law 1",
+            shape=True,
+        ),
+    },
+    laws=(
+        Law("whole", {"damping": 0.1}),
+        Law("in part", {"damping": 0.05, "share": 0.1}),
+    ),
     says="a resonance on top of the table's loop",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",
 )
