@@ -176,8 +176,8 @@ def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
 def beside_colour(fit: Fit, scales: Scales) -> Fit | None:
     """The fit with one effect more in the place of the coloured noise beside its effects; None where there is none.
 
-    Where the first effect explains nearly all of a gap, as a zero of a sensor may, the rest of it looks like noise. What
-    two good solutions of one model may differ by is no effect.
+    Where the first effect explains nearly all of a gap, as a zero of a sensor may, the rest of it looks like noise.
+    What two good solutions of one model may differ by is no effect.
     """
     if not sensor_noise.coloured(fit.data):
         return None

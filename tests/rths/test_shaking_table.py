@@ -30,7 +30,7 @@ def wanted(t: Array) -> Array:
 def shaken() -> tuple[Array, Array, Array]:
     """Command m, displacement m and acceleration m/s²; the loop by small explicit steps, the oil column exactly."""
     h = INTERVAL / SUBSTEPS
-    t: Array = np.arange(round(SECONDS / INTERVAL) * SUBSTEPS) * h
+    t = np.asarray(np.arange(round(SECONDS / INTERVAL) * SUBSTEPS) * h, dtype=np.float64)
     late, moved, gained = (
         wanted(np.asarray(np.maximum(t - DELAY - INTERVAL, 0.0), dtype=np.float64)),
         np.zeros(t.size),
