@@ -34,6 +34,7 @@ MISSED = 10.0
 INTERLEAVED, OTHERS = "interleaved (interpolation)", "other recordings"  # data on which the gap was judged
 # Share of the gap that an explanation must close: what closes less leaves the larger part of the gap open.
 SHRUNK = 0.5
+ELSEWHERE = 0.8  # the same on other recordings: 1 less the share of a gap that may be an error of the models
 # Share of the noise floor by which the response must exceed it to show an effect: the floor rests on two noisy
 # simulations, so that a smaller excess may be chance.
 ROOM = 0.1
@@ -107,9 +108,13 @@ def hardly_shown(found: Diagnosis, summary: HowFar) -> bool:
 
 
 def shrinks(found: Diagnosis, far: HowFar) -> bool:
-    """Whether the effects of the parts really close the gap; noise of a sensor and a link alone need not."""
+    """Whether the effects of the parts really close the gap; noise of a sensor and a link alone need not.
+
+    Another motion than the one that they were fitted to must be explained nearly as well.
+    """
     named = any(verdict.effects for verdict in found.verdicts)
-    return not named or far.closed is None or far.closed >= SHRUNK
+    least = ELSEWHERE if far.judged_on == OTHERS else SHRUNK
+    return not named or far.closed is None or far.closed >= least
 
 
 def by_readings(own: RecordingGaps, summary: HowFar) -> HowFar:

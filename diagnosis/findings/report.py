@@ -20,12 +20,16 @@ from diagnosis.fits import sensor_noise
 from diagnosis.fits.settling import SMALL
 from diagnosis.recorded.nuisances import LoggedForce, LoggedReadings
 from diagnosis.recorded.record import Record
-from diagnosis.report.records import Place, Report, Status, Tolerance
+from diagnosis.report.records import HowFar, Place, Report, Status, Tolerance
 
 # Warning where the effects of a part explain its readings and the test is as far from its simulation as before.
 OPEN = (
     "The effects named explain the readings of their part, but close less than half of the gap: another cause may be "
     "behind it."
+)
+UNLIKE = (
+    "The effects named explain this recording, but leave more than a fifth of the gap on the recordings given for "
+    "validation: their law is another one, or a further cause shows there."
 )
 STILL = 5.0  # rms of a signal over its noise below which nothing is judged: its noise alone is a gap of 20 %
 
@@ -61,11 +65,22 @@ def build(
         how_far=replace(far.how_far, learned=learned),
         not_exercised=exercise.not_exercised(found),
         next_test=next_test.sentence(tests),
-        warnings=(*found.warnings, *far.warnings, *named.warnings, *([] if shrunk else [OPEN]), *doubts),
+        warnings=(
+            *found.warnings,
+            *far.warnings,
+            *named.warnings,
+            *([] if shrunk else [open_gap(far.how_far)]),
+            *doubts,
+        ),
         parts=parts_table.parts(found, require),
         details=details.details(found, far, named.candidates, tests, signs),
     )
     return Judged(without_times(whole, found.record) if found.record.static else whole, found)
+
+
+def open_gap(far: HowFar) -> str:
+    """The sentence on effects that explain the readings of their part, but not the gap."""
+    return UNLIKE if far.judged_on == how_far.OTHERS else OPEN
 
 
 def status_of(found: Diagnosis) -> Status:

@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 
 from diagnosis.diagnose import own_noise
-from diagnosis.findings import how_far, verdict
+from diagnosis.findings import how_far, report, verdict
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import residuals
 from diagnosis.fits.scales import Scales
@@ -126,8 +126,13 @@ def test_an_effect_that_hardly_closes_the_gap_is_not_an_explanation(cases: Cases
         closed=0.2,
         closed_interval=None,
         noise_floor=0.01,
-        judged_on="other recordings",
+        judged_on=how_far.INTERLEAVED,
     )
     assert not how_far.shrinks(found, far)
-    assert how_far.shrinks(found, replace(far, closed=0.8))
+    assert how_far.shrinks(found, replace(far, closed=0.7))
+    elsewhere = replace(far, closed=0.7, judged_on=how_far.OTHERS)
+    assert not how_far.shrinks(found, elsewhere)
+    assert report.open_gap(elsewhere) == report.UNLIKE
+    assert report.open_gap(far) == report.OPEN
+    assert how_far.shrinks(found, replace(far, closed=0.9, judged_on=how_far.OTHERS))
     assert how_far.shrinks(Diagnosis(whole), far)
