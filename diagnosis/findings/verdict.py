@@ -81,7 +81,9 @@ def judge(search: Search) -> PartVerdict:
         outcome = without_effects(bare)
         return PartVerdict(bare, outcome, 1.0, (), (), doubted=name if outcome == "unknown" else "")
     outcome = how_well(search)
-    if outcome == "unknown" or (outcome == "partly" and imitated(search)) or trifling(search):
+    if outcome == "unknown" or (outcome == "partly" and imitated(search)):
+        return unnamed(search)
+    if trifling(search) or one_motion(search):
         return unnamed(search)
     chances = odds(search)
     same = [tied(search.chosen, other) for other in search.alternatives]
@@ -252,6 +254,18 @@ def trifling(search: Search) -> bool:
         return False
     sites = {item.site for item in ranked(search.commissioned) if item.cost < APART}
     return not sites <= {item.site for item in effects}
+
+
+def one_motion(search: Search) -> bool:
+    """Whether errors of several readings are named that follow from one motion of a machine.
+
+    One cause at the machine is likelier than two that agree by chance.
+    """
+    effects = [search.data.catalogue[name] for name in search.chosen.names]
+    if len({item.site for item in effects}) < 2 or {item.kind for item in effects} != {"measurement"}:
+        return False
+    near = [item for item in ranked(search.commissioned) if item.cost < APART and item.left < REST]
+    return any("sensor." not in item.site for item in near)
 
 
 def misplaced(search: Search) -> bool:

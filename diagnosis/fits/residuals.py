@@ -30,6 +30,7 @@ AVERAGED = 0.008  # s, over which residuals are averaged: the laboratories move 
 BLOCK = 1.0  # s, of the blocks that are held out in turn: longer than a model's error is correlated
 HELD_OUT = (2, 4)  # of every five blocks, these
 STEPPING = 2.0  # steps over the noise from which on a reading is rounded to more than its noise
+BELOW = 0.8  # rms of differences over what their median says, below which these are steps: noise has no less than one
 COARSE = 3.0  # steps that count as noise where a reading is rounded to more than its noise
 SPARSE = 0.5  # of an averaged sample's ticks that must be there
 # Deviations beyond which a sample counts as this far out: of normal noise one sample in 5e8 is, and what impacts leave
@@ -202,10 +203,15 @@ def measured_by(data: Data, white: Array) -> Data:
 
 
 def noise(residual: Array) -> Array:
-    """Rms of the white part of each residual (ticks, signals)."""
+    """Rms of the white part of each residual (ticks, signals).
+
+    By medians, which the bends of a motion do not move. The error of steps that noise does not hide takes few values,
+    of which the median may be far above the rms; no noise is louder than that.
+    """
     apart = np.abs(np.diff(residual, n=4, axis=0))
-    result: Array = tails(apart) * 1.4826 * np.median(apart, axis=0) / math.sqrt(70.0)
-    return result
+    usual = tails(apart) * 1.4826 * np.median(apart, axis=0)
+    rms = np.sqrt(np.mean(np.square(apart), axis=0))
+    return np.asarray(np.where(rms < BELOW * usual, rms, usual) / math.sqrt(70.0))
 
 
 def tails(apart: Array) -> float:

@@ -90,3 +90,12 @@ def test_a_motion_that_grows_has_no_tails() -> None:
     t = np.linspace(0.0, 12.0, 6000)
     motion = (np.exp(0.5 * t) * np.sin(12.0 * t))[:, None]
     assert residuals.tails(np.abs(np.diff(motion, n=4, axis=0))) == 1.0
+
+
+@pytest.mark.parametrize("hidden", [0.06, 0.14, 0.2])
+def test_the_error_of_steps_is_no_louder_than_its_rms(hidden: float) -> None:
+    t = np.arange(6000) * 0.002
+    motion = 150.0 * np.sin(2.0 * np.pi * 0.4 * t) + np.random.default_rng(3).normal(0.0, hidden, t.size)
+    error = np.round(motion) - motion
+    found = residuals.noise(np.stack([error, error], axis=1))
+    assert found == pytest.approx(np.sqrt(1.0 / 12.0), rel=0.25)

@@ -115,6 +115,21 @@ def judged(whole: Record) -> PartVerdict:
     return judge(Search(bare.data, bare, bare, ()))
 
 
+def test_two_drifts_that_follow_from_one_motion_are_no_errors_of_two_sensors(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    slow = 6e-5 * whole.time  # m, of a piston whose valve's null drifts
+    moved = {"column_displacement": slow, "column_force": whole.plan.column.stiffness * slow}
+    apart = {"column_displacement": slow, "column_force": -2.0 * whole.plan.column.stiffness * slow}
+    sites, outcomes = [], []
+    for more in (moved, apart):
+        signals = {name: whole.signals[name] + values for name, values in more.items()}
+        verdict = examine(replace(whole, signals=whole.signals | signals)).verdicts[2]
+        outcomes.append(verdict.outcome)
+        sites.append({DATA.catalogue[name].site for name in verdict.effects})
+    assert outcomes == ["unknown", "explained"]
+    assert sites == [set(), {"sensor.column_displacement", "sensor.column_force"}]
+
+
 def test_loud_slow_noise_of_a_single_reading_may_be_an_unknown_effect(cases: Cases) -> None:
     found = judged(wandering(cases.record(), "damper_stroke"))
     assert (found.outcome, found.doubted) == ("unknown", "damper_stroke")
