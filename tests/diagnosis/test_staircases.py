@@ -56,6 +56,12 @@ def test_a_bent_scale_is_no_staircase(bend: Callable[[Array], Array]) -> None:
     assert staircase(predicted, -predicted) is None  # a dead reading
 
 
+def test_a_wrong_gain_of_a_motion_that_rests_twice_is_no_staircase() -> None:
+    predicted = np.clip((np.arange(6000) - 1000.0) / 200.0, 0.0, 1.0)
+    noise = np.random.default_rng(1).normal(0.0, 1e-3, predicted.size)
+    assert staircase(predicted, -0.07 * predicted + noise) is None
+
+
 @pytest.mark.parametrize("rms", [5e-5, 2e-4])
 @pytest.mark.parametrize("fault", ["noise", "quantization"])
 def test_the_fault_of_a_sensor_is_told_behind_a_loggers_noise(cases: Cases, fault: str, rms: float) -> None:

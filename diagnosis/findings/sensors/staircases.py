@@ -24,6 +24,10 @@ APART, TRIED = 0.1, 4000
 # Share of the noise that steps must explain: what a prediction errs blurs them, and those of another size explain less
 # than nothing.
 SHARE = 0.25
+PART, ENOUGH = (
+    0.1,
+    200,
+)  # of a step from one sample that is looked at to the next, and how many of these suffice
 COARSEST = 0.5  # of the largest reading, above which steps look like a bend of the scale
 
 
@@ -75,12 +79,18 @@ def findings(hidden: Mapping[str, Stairs], record: Record, *, logged: bool) -> l
 def staircase(predicted: Array, residual: Array) -> Stairs | None:
     """The step to which a reading was rounded before noise was added; None where rounding does not explain it.
 
-    `predicted` and `residual` (ticks,) are the reading without steps and what was measured beyond it.
+    `predicted` and `residual` (ticks,) are the reading without steps and what was measured beyond it. They are looked
+    at where the reading has moved on by a part of a step, because where it rests any error is that of some step.
     """
     usual = math.sqrt(12.0) * float(np.std(residual))
-    reach = float(np.max(np.abs(predicted), initial=0.0))
-    if usual == 0.0 or reach == 0.0:
+    if usual == 0.0:
         return None
+    moved = np.cumsum(np.abs(np.diff(predicted, prepend=predicted[0]))) // (PART * usual)
+    on_way = np.flatnonzero(np.diff(moved, prepend=0.0))
+    if on_way.size < ENOUGH:
+        return None
+    predicted, residual = predicted[on_way], residual[on_way]
+    reach = float(np.max(np.abs(predicted)))
     count = min(TRIED, 16 + math.ceil(math.log(MOST / LEAST) * reach / (LEAST * usual * APART)))
     steps = usual * np.geomspace(LEAST, MOST, count)
     steps = steps[steps < COARSEST * reach]
