@@ -123,7 +123,8 @@ def test_two_drifts_that_follow_from_one_motion_are_no_errors_of_two_sensors(cas
     sites, outcomes = [], []
     for more in (moved, apart):
         signals = {name: whole.signals[name] + values for name, values in more.items()}
-        verdict = examine(replace(whole, signals=whole.signals | signals)).verdicts[2]
+        read = replace(whole, signals=whole.signals | signals)
+        verdict = judge(search(residuals.prepare(lab_a(read), read), Scales(read)))
         outcomes.append(verdict.outcome)
         sites.append({DATA.catalogue[name].site for name in verdict.effects})
     assert outcomes == ["unknown", "explained"]
