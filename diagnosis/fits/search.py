@@ -13,7 +13,7 @@ from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import leaves, model_error, remaining
 
-MOST = 3  # effects of one part, zeros of sensors aside: more of them can imitate any residual
+MOST = 3  # effects of one part, the bias of a sensor aside: more of them can imitate any residual
 # Effects of one part that leave only noise, each of them needed for that; the share of what is left that each must
 # explain on the way. Of 11 gaps of unknown effects and other formulas none was taken for such a set.
 TOGETHER, STEP_OF_LEFT = 6, 0.3

@@ -25,6 +25,7 @@ from diagnosis.recorded.nuisances import (
     of_building,
 )
 from diagnosis.recorded.record import Record
+from diagnosis.signals import pieces
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
 from laboratories.kind import Machine
@@ -201,25 +202,11 @@ class LaboratoryPart:
         return np.asarray(np.sqrt(np.mean(np.square(read), axis=0)))
 
     def begun_elsewhere(self, missed: Array) -> Array:
-        """Of what a replay in pieces misses (ticks,), the share that follows from where and how fast each piece begins.
-
-        That is known from a few noisy samples only, so the best place and rate of each piece are taken.
-        """
-        starts = np.asarray(self.anew)[:, 0].astype(int)
-        lengths = np.diff(np.append(starts, missed.size))
-        after = (np.arange(missed.size) - np.repeat(starts, lengths)) * self._interval
-        slope = -np.expm1(-self._decay * after) / self._decay if self._decay > 0.0 else after
-        there = self.present[:, self.freed].astype(np.float64)
-
-        def summed(values: Array) -> Array:
-            return np.asarray(np.add.reduceat(there * values, starts))
-
-        count, first, second = summed(np.ones(missed.size)), summed(slope), summed(slope**2)
-        whole, along = summed(missed), summed(slope * missed)
-        spread = np.maximum(count * second - first**2, np.finfo(np.float64).tiny)
-        rate = (count * along - first * whole) / spread
-        place = (whole - rate * first) / np.maximum(count, 1.0)
-        return np.asarray(np.repeat(place, lengths) + np.repeat(rate, lengths) * slope)
+        """What of the motion that a replay misses (ticks,) follows from where and how fast each piece begins."""
+        there = self.present[:, self.freed]
+        return pieces.begun(
+            missed, there, np.asarray(self.anew)[:, 0].astype(int), self._interval, self._decay
+        )
 
     def motion(self, system: System, drive: list[Array]) -> Array:
         """What sensors without error would read, (ticks, channels), of a system with such sensors.

@@ -18,6 +18,7 @@ import numpy as np
 
 from common.plan.laboratory_tables import Damper, ShakingTable
 from laboratories.column.model import substeps
+from laboratories.table import coupling
 from laboratories.table.linear import (
     ACCELERATION,
     BASE,
@@ -109,7 +110,7 @@ def build(
     law, braked = np.array(on_damper.learned), np.array(on_table.learned)
     short = short or law.size > 0 or braked.size > 0 or on_damper.asymmetry != 0.0
     short = short or not (math.isinf(on_table.velocity_limit) and math.isinf(on_damper.second_frequency))
-    behind_coupling = coupling(damper, on_damper)
+    behind_coupling = coupling.constants(damper, on_damper)
     damper = replace(damper, mass=damper.mass - behind_coupling[0])
     segments = delay.split(interval, table.delay, substeps(interval) if short else 1)
     alike: dict[float, Array] = {}  # equal steps differ by rounding only
@@ -160,15 +161,6 @@ def valve(table: ShakingTable, effects: TableEffects) -> tuple[float, float, flo
         return math.inf, 0.0, 0.0
     omega, twice = 2.0 * math.pi * table.frequency, 2.0 * table.damping_ratio
     return effects.velocity_limit, omega / twice, twice * omega
-
-
-def coupling(damper: Damper, effects: DamperEffects) -> tuple[float, float, float, float, float]:
-    """What `limits` holds of a mass behind a coupling, from place `SECOND` on."""
-    if math.isinf(effects.second_frequency):
-        return 0.0, 0.0, 0.0, 0.0, 1.0
-    omega, share = 2.0 * math.pi * effects.second_frequency, effects.second_mass
-    damped, half = 2.0 * effects.second_damping * omega, 0.5 * effects.second_play
-    return share * damper.mass, omega**2, damped, half, 1.0 / (1.0 - share)
 
 
 @jit
@@ -310,7 +302,16 @@ def resist(columns: Array, lab: TableLab, length: float) -> None:
         rate = 0.5 * (state[STROKE_RATE] + with_forces(columns, state, lab.free, STROKE_RATE))
         state[rail] += limits[ASYMMETRY] * lab.spring[1] * abs(rate)
     if limits[SECOND] > 0.0:
-        state[size + INPUTS + HELD] = coupled(limits, state, size, length)
+        state[size + INPUTS + HELD] = coupling.force(
+            state[size + INPUTS + APART],
+            state[size + INPUTS + APART_RATE],
+            length,
+            limits[SECOND],
+            limits[COUPLING],
+            limits[COUPLED_RATE],
+            limits[GAP],
+            limits[WHOLE],
+        )
         state[rail] -= state[size + INPUTS + HELD]
     if lab.learned.size > 0:
         state[rail] += preisach.step(lab.learned, lab.learned_memory, middle, state[STROKE_RATE])
@@ -341,22 +342,6 @@ def throttled(limits: Array, state: Array, size: int, base: int, length: float) 
     command = 0.5 * (state[size] + state[size + 1])
     wanted = limits[OPENING] * (command - state[base - 1] - 0.5 * length * state[base])
     return float(limits[VALVE] * (min(max(wanted, -limits[FASTEST]), limits[FASTEST]) - wanted))
-
-
-@jit
-def coupled(limits: Array, state: Array, size: int, length: float) -> float:
-    """Force (N) of the coupling on the first mass at the middle of a segment; on a flank of its play it only pushes."""
-    rate = state[size + INPUTS + APART_RATE]
-    ahead = state[size + INPUTS + APART] + 0.5 * length * rate
-    # of a strong dashpot as if it acted on the rate at the segment's end, so that it never turns the motion around
-    damped = limits[COUPLED_RATE] / (1.0 + 0.5 * length * limits[COUPLED_RATE] * limits[WHOLE])
-    if limits[GAP] == 0.0:
-        return float(limits[SECOND] * (limits[COUPLING] * ahead + damped * rate))
-    bent = ahead - min(max(ahead, -limits[GAP]), limits[GAP])
-    if bent == 0.0:
-        return 0.0
-    force = limits[SECOND] * (limits[COUPLING] * bent + damped * rate)
-    return float(max(force, 0.0) if bent > 0.0 else min(force, 0.0))
 
 
 @jit

@@ -60,6 +60,11 @@ def effect_on(record: Record, name: str, fault: str) -> str:
     return lab.site(f"sensor.{name.removeprefix(lab.ahead)}.{fault}")
 
 
+def planned(record: Record) -> dict[str, float]:
+    """Rms noise of the readings that have one by the plan, by signal."""
+    return {name: level for lab in record.labs for name, level in lab.noise.items() if level > 0.0}
+
+
 def steps(record: Record) -> dict[str, float]:
     """Rounding step of every reading that has one, by signal."""
     found = {}
@@ -194,18 +199,18 @@ def findings(
     `rounded` are the steps of `steps` that a sensor may have made; `white` is the rms noise. Where a logger recorded
     (`logged`), noise as small as that of its converter is the logger's.
     """
-    planned = {name: level for lab in record.labs for name, level in lab.noise.items() if level > 0.0}
+    noise_of = planned(record)
     # A value that is only stated has no noise.
     read = {name for name in white if np.ptp(record.signals[name]) > 0.0}
     noise = {name: beside_rounding(level, steps.get(name, 0.0)) for name, level in white.items()}
     ratios = {
-        name: noise[name] / planned[name] for name in noise if name in read & planned.keys() and noise[name]
+        name: noise[name] / noise_of[name] for name in noise if name in read & noise_of.keys() and noise[name]
     }
     usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, LEAST_SCALE)
     result = []
     coarse = coarsest(record, rounded) | stated_steps(record)
     for name, step in rounded.items():
-        expected = planned.get(name, 0.0) * usual
+        expected = noise_of.get(name, 0.0) * usual
         if step > SAME * max(expected, coarse.get(name, 0.0)):
             size = step / np.sqrt(12.0) / expected if expected > 0.0 else 0.0
             bounds = ((1.0 - STEP_ERROR) * step, (1.0 + STEP_ERROR) * step)
@@ -218,7 +223,7 @@ def findings(
         if logged and noise[name] < CONVERTER * float(np.max(np.abs(record.signals[name]))):
             continue
         if ratio > LOUDER * max(expected, QUIETEST) and ratio > LEAST:
-            value = float(np.sqrt(max(noise[name] ** 2 - (expected * planned[name]) ** 2, 0.0)))
+            value = float(np.sqrt(max(noise[name] ** 2 - (expected * noise_of[name]) ** 2, 0.0)))
             bounds = ((1.0 - NOISE_ERROR) * value, (1.0 + NOISE_ERROR) * value)
             result.append(
                 SensorFinding(effect_on(record, name, "noise"), "rms", value, bounds, ratio / expected)

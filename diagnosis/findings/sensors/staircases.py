@@ -24,10 +24,8 @@ APART, TRIED = 0.1, 4000
 # Share of the noise that steps must explain: what a prediction errs blurs them, and those of another size explain less
 # than nothing.
 SHARE = 0.25
-PART, ENOUGH = (
-    0.1,
-    200,
-)  # of a step from one sample that is looked at to the next, and how many of these suffice
+PART = 0.1  # of a step, that a reading moves on from one sample that is looked at to the next
+ENOUGH = 200  # such samples, without which nothing is said of steps
 COARSEST = 0.5  # of the largest reading, above which steps look like a bend of the scale
 
 
@@ -46,7 +44,7 @@ def hidden(search: Search, record: Record) -> dict[str, Stairs]:
     Both what the effects found predict and what the plan predicts inside its tolerances may show them.
     """
     read, data, found = readings.read_by(record), search.data, {}
-    planned = {name: level for lab in record.labs for name, level in lab.noise.items()}
+    planned = readings.planned(record)
     for fit in (search.commissioned, search.chosen):
         system = hypothesis.lay(data, fit.z, fit.values)
         predicted, residual = data.part.predict(system), data.residual(system)
@@ -64,7 +62,7 @@ def hidden(search: Search, record: Record) -> dict[str, Stairs]:
 
 def findings(hidden: Mapping[str, Stairs], record: Record, *, logged: bool) -> list[readings.SensorFinding]:
     """Sensors that round to `hidden` steps; of a recording that was logged (`logged`), its converter made fine ones."""
-    planned = {name: level for lab in record.labs for name, level in lab.noise.items()}
+    planned = readings.planned(record)
     result = []
     for name, stairs in hidden.items():
         noise, usual = stairs.step / math.sqrt(12.0), planned.get(name, 0.0)
