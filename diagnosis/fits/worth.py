@@ -89,7 +89,7 @@ def refines(bare: Fit, before: Fit, after: Fit) -> bool:
     """Whether a further effect takes away enough of what is left, and of the whole gap.
 
     A gap that is larger than the readings themselves counts as these: a nominal stiffness that means nothing must not
-    hide what a specimen does. Nor must zeros of sensors that are off, which are no motion.
+    hide what a specimen does. Nor must the bias of a sensor, which is no motion.
     """
     left, saved = excess(before), excess(before) - excess(after)
     whole = min(moving(bare), bare.data.energy)

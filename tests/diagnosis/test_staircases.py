@@ -56,8 +56,10 @@ def test_a_bent_scale_is_no_staircase(bend: Callable[[Array], Array]) -> None:
     assert staircase(predicted, -predicted) is None  # a dead reading
 
 
-def test_a_wrong_gain_of_a_motion_that_rests_twice_is_no_staircase() -> None:
-    predicted = np.clip((np.arange(6000) - 1000.0) / 200.0, 0.0, 1.0)
+@pytest.mark.parametrize("cycles", [1, 15])
+def test_a_wrong_gain_of_a_motion_that_mostly_rests_is_no_staircase(cycles: int) -> None:
+    phase = np.linspace(0.0, cycles, 12000) % 1.0
+    predicted = np.clip(8.0 * phase, 0.0, 1.0) - np.clip(8.0 * (phase - 0.5), 0.0, 1.0)
     noise = np.random.default_rng(1).normal(0.0, 1e-3, predicted.size)
     assert staircase(predicted, -0.07 * predicted + noise) is None
 
