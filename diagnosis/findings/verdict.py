@@ -173,15 +173,18 @@ def lone_noise(fit: Fit) -> str:
     """The only reading with loud slow noise of which nothing but its motion tells, empty where there is none.
 
     A logger treats its channels alike, and what a machine with a resonance does by an unknown effect looks like this.
-    Where the machine is not at rest the effect is there as well, in the part that moves least too.
+    Where the machine is not at rest the effect is there as well, in the part that moves least too. Noise that is no
+    louder than the plan says is that of the sensor.
     """
     loud = sensor_noise.loudest(fit)
     if loud.size < 2 or any(item.source == "at rest" for item in fit.data.noise):
         return ""
-    second, first = np.sort(loud)[-2:]
+    place, (second, first) = int(np.argmax(loud)), np.sort(loud)[-2:]
     if first < LONE or (second > QUIET and first < LONE * second):
         return ""
-    return fit.data.part.signals[int(np.argmax(loud))]
+    planned = fit.data.planned
+    expected = planned is not None and fit.data.noise[place].rms <= planned[place]
+    return "" if expected else fit.data.part.signals[place]
 
 
 def in_common_noise(search: Search) -> Search:

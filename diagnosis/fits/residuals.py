@@ -56,6 +56,7 @@ class Data:
     lines: Array | None = None  # (ticks, signals) what the sensors pick up
     spikes: Mask | None = None  # (ticks, signals) single samples that do not count
     related: Crosswise | None = None  # what may follow from the part's inputs
+    planned: Array | None = None  # (signals,) rms noise by the plan, 0 for none
     heard: Array | None = None  # (signals,) coloured noise that other signals' gaps made doubtful, 0 for none
 
     @property
@@ -171,7 +172,8 @@ def prepare(part: Part, record: Record, steps: Mapping[str, float] | None = None
     group, train = withheld(part.measured.shape[0], interval)
     ones = np.ones(part.measured.shape[1])
     rounded = np.array([(steps or {}).get(name, 0.0) for name in part.signals])
-    data = Data(part, system, ones, 0.0 * ones, group, train, rounded, record.catalogue)
+    planned = np.array([record.planned_noise.get(name, 0.0) for name in part.signals])
+    data = Data(part, system, ones, 0.0 * ones, group, train, rounded, record.catalogue, planned=planned)
     return measured_by(data, 0.0 * ones if part.exact else noise(data.residual(system)))
 
 

@@ -130,6 +130,11 @@ class Record:
         rows = (*OF_BUILDING, *(row for lab in self.labs for row in lab.rows))
         return next((row.unit for row in rows if row.name == name), "")
 
+    @property
+    def planned_noise(self) -> dict[str, float]:
+        """Rms noise of the readings that have one by the plan, by signal."""
+        return {name: level for lab in self.labs for name, level in lab.noise.items() if level > 0.0}
+
     def has(self, *names: str) -> bool:
         """Whether all these signals are there for most of the test."""
         return all(name in self.signals and self.present[name].mean() > 0.5 for name in names)

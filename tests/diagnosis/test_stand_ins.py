@@ -148,6 +148,15 @@ def test_slow_noise_is_proven_by_rest_alone(cases: Cases) -> None:
     assert told("at rest") == ""
 
 
+def test_slow_noise_that_the_plan_states_is_no_unknown_effect(cases: Cases) -> None:
+    whole = cases.record()
+    loud = whole.plan.sensors.damper_stroke + WANDER
+    plan = replace(whole.plan, sensors=replace(whole.plan.sensors, damper_stroke=loud))
+    labs = tuple(replace(lab, plan=plan) for lab in whole.labs)
+    for record, name in ((whole, "damper_stroke"), (replace(whole, labs=labs), "")):
+        assert lone_noise(bare_fit(wandering(record, "damper_stroke", wander=WANDER))) == name
+
+
 def behind_logger(whole: Record) -> Record:
     """The record with slow noise of one colour on all readings of the slave's laboratory."""
     lab = whole.labs[1]

@@ -60,11 +60,6 @@ def effect_on(record: Record, name: str, fault: str) -> str:
     return lab.site(f"sensor.{name.removeprefix(lab.ahead)}.{fault}")
 
 
-def planned(record: Record) -> dict[str, float]:
-    """Rms noise of the readings that have one by the plan, by signal."""
-    return {name: level for lab in record.labs for name, level in lab.noise.items() if level > 0.0}
-
-
 def steps(record: Record) -> dict[str, float]:
     """Rounding step of every reading that has one, by signal."""
     found = {}
@@ -199,7 +194,7 @@ def findings(
     `rounded` are the steps of `steps` that a sensor may have made; `white` is the rms noise. Where a logger recorded
     (`logged`), noise as small as that of its converter is the logger's.
     """
-    noise_of = planned(record)
+    noise_of = record.planned_noise
     # A value that is only stated has no noise.
     read = {name for name in white if np.ptp(record.signals[name]) > 0.0}
     noise = {name: beside_rounding(level, steps.get(name, 0.0)) for name, level in white.items()}

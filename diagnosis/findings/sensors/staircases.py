@@ -44,7 +44,7 @@ def hidden(search: Search, record: Record) -> dict[str, Stairs]:
     Both what the effects found predict and what the plan predicts inside its tolerances may show them.
     """
     read, data, found = readings.read_by(record), search.data, {}
-    planned = readings.planned(record)
+    planned = record.planned_noise
     for fit in (search.commissioned, search.chosen):
         system = hypothesis.lay(data, fit.z, fit.values)
         predicted, residual = data.part.predict(system), data.residual(system)
@@ -62,7 +62,7 @@ def hidden(search: Search, record: Record) -> dict[str, Stairs]:
 
 def findings(hidden: Mapping[str, Stairs], record: Record, *, logged: bool) -> list[readings.SensorFinding]:
     """Sensors that round to `hidden` steps; of a recording that was logged (`logged`), its converter made fine ones."""
-    planned = readings.planned(record)
+    planned = record.planned_noise
     result = []
     for name, stairs in hidden.items():
         noise, usual = stairs.step / math.sqrt(12.0), planned.get(name, 0.0)
