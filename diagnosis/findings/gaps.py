@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -11,7 +12,7 @@ from diagnosis.fits import residuals
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded import link
 from diagnosis.recorded.divided import parts_of
-from diagnosis.recorded.loop import RecordedLoop
+from diagnosis.recorded.loop import RecordedLoop, overall
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from models.registry import Array
@@ -93,6 +94,13 @@ class RecordingGaps:
             level = float(np.mean(recorded**2))
             result[name] = float(np.sqrt(np.mean(error**2) / level)) if level > 0.0 else 0.0
         return result
+
+    def between(self, one: Mapping[str, Array] | None, other: Mapping[str, Array] | None) -> float:
+        """Rms of the difference of two simulated responses over that of the recorded one, over all response signals."""
+        if one is None or other is None:
+            return math.inf
+        apart = {name: self.record.signals[name] + other[name] - one[name] for name in self.gap(one)}
+        return overall(self.gap(apart))
 
     def moves(self, name: str) -> bool:
         """Whether a signal stands well out of its noise."""

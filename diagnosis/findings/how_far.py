@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -35,11 +36,14 @@ INTERLEAVED, OTHERS = "interleaved (interpolation)", "other recordings"  # data 
 # Share of the gap that an explanation must close: what closes less leaves the larger part of the gap open.
 SHRUNK = 0.5
 ELSEWHERE = 0.8  # the same on other recordings: 1 less the share of a gap that may be an error of the models
-# Share of the noise floor by which the response must exceed it to show an effect: the floor rests on two noisy
-# simulations, so that a smaller excess may be chance.
+# Share of the noise floor by which an effect must raise the gap above it for the response to show it: the floor rests
+# on two noisy simulations, so that a smaller excess may be chance.
 ROOM = 0.1
+# Times the noise floor up to which a gap that no effect changes may be that of nominal parameters, which are known
+# within noise only. An effect of this size counts as visible in a trial.
+VISIBLE = 2.0
 NOT_SHOWN = (
-    "The response of the closed loop hardly shows the gap, so the share that closes is that of the readings of the "
+    "The response of the closed loop hardly shows the effects, so the share that closes is that of the readings of the "
     "part with the effect."
 )
 LEAVING = ("unknown", "partly")  # outcomes of parts with something left
@@ -82,7 +86,7 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
         noise_floor=floor,
         judged_on=INTERLEAVED,
     )
-    hidden = own.loop is not None and hardly_shown(found, summary)
+    hidden = own.loop is not None and hardly_shown(found, summary, own.between(before, after))
     told = by_readings(own, summary) if hidden else summary
     others = validated(found, validation, summary) if validation else told
     share, rows = shares(own, traces)
@@ -101,10 +105,17 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
     )
 
 
-def hardly_shown(found: Diagnosis, summary: HowFar) -> bool:
-    """Whether effects were named although the response of the closed loop hardly exceeds its noise."""
-    before, floor = summary.before or 0.0, summary.noise_floor or 0.0
-    return any(verdict.effects for verdict in found.verdicts) and before - floor < ROOM * floor
+def hardly_shown(found: Diagnosis, summary: HowFar, changed: float) -> bool:
+    """Whether effects were named that the response of the closed loop hardly shows beside its noise.
+
+    They have `changed` it by less than the noise hides, as a share of its rms, and what is left may be noise and an
+    error of nominal parameters.
+    """
+    before, after, floor = summary.before or 0.0, summary.after or 0.0, summary.noise_floor or 0.0
+    if not any(verdict.effects for verdict in found.verdicts):
+        return False
+    shown = min(before, math.hypot(floor, changed)) if after < VISIBLE * floor else before
+    return shown - floor < ROOM * floor
 
 
 def shrinks(found: Diagnosis, far: HowFar) -> bool:

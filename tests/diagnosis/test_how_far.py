@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -209,5 +210,10 @@ def test_a_diverging_simulation_is_reported_as_a_gap(rubbing: Diagnosis) -> None
     wild = judge.loop.simulate(wild_systems)
     assert set(judge.gap(wild).values()) == set(judge.gap(None).values()) == {10.0}
     assert how_far.histories(judge, None, judge.signals(None)) == ()
+    found = judge.signals(None)
+    assert found is not None
+    larger = {name: series + 0.1 * rubbing.record.signals[name] for name, series in found.items()}
+    assert judge.between(found, larger) == pytest.approx(0.1)
+    assert judge.between(None, found) == math.inf
     quiet = dataclasses.replace(judge.loop, names=("column_force",))
     assert set(quiet.gap(judge.signals(None))) == {"column_force"}

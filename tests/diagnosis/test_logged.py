@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -136,3 +138,30 @@ def test_an_effect_that_hardly_closes_the_gap_is_not_an_explanation(cases: Cases
     assert report.open_gap(far) == report.OPEN
     assert how_far.shrinks(found, replace(far, closed=0.9, judged_on=how_far.OTHERS))
     assert how_far.shrinks(Diagnosis(whole), far)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "changed", "hidden"),
+    [
+        (0.020, 0.019, 0.002, True),  # 12 % above the noise, of which the effects make next to nothing
+        (0.0105, 0.010, 0.009, True),  # no gap at all
+        (0.020, 0.012, 0.016, False),  # the effects are as large as the gap
+        (0.100, 0.099, 0.002, False),  # so far above the noise that another cause must be behind it
+        (0.100, 10.0, math.inf, False),  # the simulation with the effects diverges
+    ],
+)
+def test_the_response_shows_effects_that_change_it_by_more_than_noise(
+    drifting: Search, before: float, after: float, changed: float, hidden: bool
+) -> None:
+    far = HowFar(
+        nominal=before,
+        before=before,
+        after=after,
+        closed=0.0,
+        closed_interval=None,
+        noise_floor=0.010,
+        judged_on=how_far.INTERLEAVED,
+    )
+    named = Diagnosis(cast(Record, None), verdicts=[verdict.judge(drifting)])
+    assert how_far.hardly_shown(named, far, changed) is hidden
+    assert not how_far.hardly_shown(Diagnosis(cast(Record, None)), far, changed)
