@@ -23,6 +23,7 @@ class ActuatorEffects:
     )
     spring_back: float = 0.01  # s, in which a specimen springs back through greased play
     compliance: float = 0.0  # m/N
+    compliance_law: float = 0.0  # 0 behind the loop, between piston and specimen, 1 within the loop
     deadband: float = 0.0  # m, whole band of the loop's error without flow
     deadband_law: float = 0.0  # 0 with sharp edges, 1 with edges that leak
     learned: tuple[float, ...] = ()  # a law of `models.preisach` that adds to the motion, m

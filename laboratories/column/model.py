@@ -40,7 +40,8 @@ SERVO, DISPLACEMENT, FORCE, PLAYED, LOOSE, STATES = range(6)
 PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, HYDRAULIC, BEYOND, BEFORE = (
     range(11)
 )
-SPRING_BACK, LEAKING = range(11, 13)
+SPRING_BACK, LEAKING, LOAD = range(11, 14)  # LOAD: compliance within the loop
+WITHIN_LOOP = 1.0  # law of `actuator.compliance`: the load takes from the error of the loop
 # laws of `actuator.backlash`: the play between command and loop, and greased play behind the loop
 BEFORE_LOOP, GREASED = 1.0, 2.0
 
@@ -82,14 +83,15 @@ def build(
     )
     rows = first_order.propagators(actuator.gain, actuator.time_constant, segments.lengths)
     before, behind = plays(on_actuator)
-    limits = [float(present), on_actuator.velocity_limit, behind, on_actuator.compliance]
+    behind_loop, within = compliances(on_actuator)
+    limits = [float(present), on_actuator.velocity_limit, behind, behind_loop]
     limits += [on_actuator.deadband, actuator.gain, column.stiffness, float(actuator.command == "held")]
     law = np.array(on_actuator.learned)
     return ColumnLab(
         segments.taps,
         rows,
         segments.lengths,
-        np.array([*limits, 0.0, 0.0, before, *formulas(on_actuator)]),
+        np.array([*limits, 0.0, 0.0, before, *formulas(on_actuator), within]),
         np.zeros(segments.memory),
         np.zeros(STATES),
         specimen.build(column, on_column),
@@ -103,6 +105,13 @@ def plays(effects: ActuatorEffects) -> tuple[float, float]:
     if effects.backlash_law == BEFORE_LOOP:
         return effects.backlash, 0.0
     return 0.0, effects.backlash
+
+
+def compliances(effects: ActuatorEffects) -> tuple[float, float]:
+    """The compliance (m/N) behind and within the loop."""
+    if effects.compliance_law == WITHIN_LOOP:
+        return 0.0, effects.compliance
+    return effects.compliance, 0.0
 
 
 def formulas(effects: ActuatorEffects) -> tuple[float, float]:
@@ -131,15 +140,16 @@ def hydraulic(
         )
     bare = replace(column, mass=0.0, damping=0.0)
     on_column = replace(on_column, viscous=0.0, inertia=0.0)
-    a, b = servo_hydraulic.rates(servo, column.stiffness, damping, mass, on_actuator.compliance)
+    behind, within = compliances(on_actuator)
+    a, b = servo_hydraulic.rates(servo, column.stiffness, damping, mass, behind, within)
     beyond = column.model != "linear" or on_column != ColumnEffects()
     limited = math.isfinite(on_actuator.velocity_limit) or on_actuator.deadband > 0.0
     steps = max(1, math.ceil(interval / FINE_SUBSTEP - 1e-9)) if beyond or limited else 1
     held = actuator.command == "held"
     segments = delay.split(interval, servo.delay, steps, held=held)
-    limits = [float(limited), on_actuator.velocity_limit * servo.piston, 0.0, on_actuator.compliance]
+    limits = [float(limited), on_actuator.velocity_limit * servo.piston, 0.0, behind]
     limits += [on_actuator.deadband, servo.gain, column.stiffness, float(held), 1.0, float(beyond), 0.0]
-    limits += formulas(on_actuator)
+    limits += [*formulas(on_actuator), within]
     return ColumnLab(
         segments.taps,
         servo_hydraulic.propagators(a, b, segments.lengths),
@@ -210,7 +220,12 @@ def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
         else:
             ahead = first_order.step(rows[i], servo, before, after)
             if limits[PRESENT] != 0.0:
-                servo += limited(limits, ahead - servo, 0.5 * (before + after), servo, lengths[i])
+                middle = 0.5 * (before + after)
+                if limits[LOAD] > 0.0:
+                    ahead = under_load(rows[i], limits, ahead, servo, cell[REACTION])
+                    pull = cell[REACTION] + 0.5 * limits[STIFFNESS] * (ahead - servo)
+                    middle -= limits[LOAD] * pull / limits[GAIN]
+                servo += limited(limits, ahead - servo, middle, servo, lengths[i])
                 displacement = loaded(limits, state, servo, displacement, cell[REACTION], lengths[i])
             else:
                 servo = ahead
@@ -236,7 +251,8 @@ def overlapped(limits: Array, state: Array, command: float) -> float:
     if half == 0.0:
         return 0.0
     piston = (
-        state[STATES + servo_hydraulic.POSITION] + limits[COMPLIANCE] * state[STATES + servo_hydraulic.FORCE]
+        state[STATES + servo_hydraulic.POSITION]
+        + (limits[COMPLIANCE] + limits[LOAD]) * state[STATES + servo_hydraulic.FORCE]
     )
     error = limits[GAIN] * command - piston
     return blocked(limits, error) / limits[GAIN]
@@ -260,6 +276,17 @@ def choked(limits: Array, state: Array) -> None:
     if abs(flow) > most:
         state[STATES + servo_hydraulic.FLOW] = most if flow > 0.0 else -most
         state[STATES + servo_hydraulic.FLOW_RATE] = 0.0
+
+
+@jit
+def under_load(row: Array, limits: Array, ahead: float, servo: float, reaction: float) -> float:
+    """Displacement of the piston (m) at a segment's end if the load within the loop moves it like a command of −c·f/K.
+
+    `ahead` is that without load. The force is taken as `reaction + k·Δy`, linear over the segment, as in `loaded`.
+    """
+    moved = limits[LOAD] / limits[GAIN]
+    stiff = moved * row[2] * limits[STIFFNESS]
+    return float((ahead - moved * (row[1] + row[2]) * reaction + stiff * servo) / (1.0 + stiff))
 
 
 @jit

@@ -1,13 +1,13 @@
 """Servo-hydraulic actuator in interaction with its specimen, propagated exactly over segments of its command.
 
-    q̈ + β1·q̇ + β2·q = a1β0·(g·u − x − c_f·f)      controller and servo valve: the flow q as rate of force, N/s
+    q̈ + β1·q̇ + β2·q = a1β0·(g·u − x − (c_f + c_v)·f)      controller and servo valve: the flow q as rate of force, N/s
     ḟ = −a3·f + q − a2·(ẋ + c_f·ḟ)                  oil column: leakage, and the oil that the piston's motion takes
     m·ẍ + c·ẋ + k·x + w = f                          specimen: f (N) is what its load cell reads
 
 C. E. Silva, D. Gomez, A. Maghareh, S. J. Dyke and B. F. Spencer, Benchmark control problem for real-time hybrid
 simulation, Mech. Syst. Signal Process. 135 (2020) 106381, after S. J. Dyke, B. F. Spencer, P. Quast and M. K. Sain,
-J. Eng. Mech. 121 (1995). The compliance c_f (m/N) of oil and frame between piston and specimen is an addition; it is
-zero unless an effect sets it.
+J. Eng. Mech. 121 (1995). The compliance c_f (m/N) of oil and frame between piston and specimen is an addition, and
+so is c_v, by which the load takes from the error of the loop; they are zero unless an effect sets them.
 
 The equations are linear except for w (N), the part of the specimen's force beyond k·x: it is an input, held constant
 over a segment. The command is linear over a segment, so that one matrix exponential propagates the state exactly.
@@ -30,16 +30,22 @@ WIDTH = STATES + 3
 
 
 def rates(
-    servo: ServoHydraulics, stiffness: float, damping: float, mass: float, compliance: float
+    servo: ServoHydraulics,
+    stiffness: float,
+    damping: float,
+    mass: float,
+    compliance: float = 0.0,
+    within: float = 0.0,
 ) -> tuple[Array, Array]:
     """State matrix (5, 5) and input matrix (5, 2) for command (m) and w (N), dead time apart.
 
-    The specimen's `stiffness` N/m, `damping` N·s/m and `mass` kg; the `compliance` of oil and frame m/N.
+    The specimen's `stiffness` N/m, `damping` N·s/m and `mass` kg; the `compliance` of oil and frame m/N,
+    and the one `within` the loop m/N.
     """
     a, b = np.zeros((STATES, STATES)), np.zeros((STATES, 2))
     a[FLOW, FLOW_RATE] = 1.0
     a[FLOW_RATE, FLOW], a[FLOW_RATE, FLOW_RATE] = -servo.valve_stiffness, -servo.valve_damping
-    a[FLOW_RATE, POSITION], a[FLOW_RATE, FORCE] = -servo.valve, -servo.valve * compliance
+    a[FLOW_RATE, POSITION], a[FLOW_RATE, FORCE] = -servo.valve, -servo.valve * (compliance + within)
     yielding = 1.0 + servo.piston * compliance
     a[FORCE, [FLOW, FORCE, VELOCITY]] = np.array([1.0, -servo.leakage, -servo.piston]) / yielding
     a[POSITION, VELOCITY] = 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,22 +19,23 @@ from tests.laboratories.effects.histories import DT, SHORT, Array, K, ramped, ru
 DIRECT = Actuator(gain=1.0, delay=0.0, time_constant=0.0)
 
 
-@pytest.mark.parametrize("gain", [1.0, 0.9])
+@pytest.mark.parametrize(("gain", "load"), [(1.0, 0.0), (0.9, 0.0), (0.9, 2e-8)])
 @pytest.mark.parametrize("leaking", [0.0, 1.0], ids=["sharp", "leaking"])
 @pytest.mark.parametrize(
     ("limit", "band"), [(0.02, 0.0), (math.inf, 4e-4), (0.03, 4e-4)], ids=["limit", "band", "both"]
 )
-def test_the_servo_loop_solves_its_equation_with_limit_and_dead_band(
-    limit: float, band: float, leaking: float, gain: float
+def test_the_servo_loop_solves_its_equation_with_limit_dead_band_and_load(
+    limit: float, band: float, leaking: float, gain: float, load: float
 ) -> None:
     actuator = Actuator(gain=gain, delay=0.0133, time_constant=0.030)
     command = tones(400, size=1.5e-3)
     more = ActuatorEffects(velocity_limit=limit, deadband=band, deadband_law=leaking)
+    more = replace(more, compliance=load, compliance_law=1.0)
     got = run_a(command, actuator, actuator_effects=more)[:, 0]
     reached = ramped(command, 0.0133)
 
     def slope(t: float, y: Array) -> Any:
-        error = gain * reached(t) - y
+        error = gain * reached(t) - y - load * K * y
         half = band / 2
         blocked = half * np.tanh(error / half) if leaking and band else np.clip(error, -half, half)
         return np.clip((error - blocked) / 0.030, -limit, limit)
@@ -106,6 +108,15 @@ def test_the_force_of_a_specimen_moves_it_through_greased_play(compliance: float
     assert (
         np.max(np.abs(got - exact[fine - 1 :: fine])) < 0.03 * width
     )  # of implicit steps of an eighth of the shorter time
+
+
+def test_a_load_within_the_loop_makes_it_weaker_and_faster_under_a_linear_specimen() -> None:
+    command, stiffer = tones(400, size=1.5e-3), 1.0 + 3e-8 * K
+    got = run_a(command, actuator_effects=ActuatorEffects(compliance=3e-8, compliance_law=1.0))
+    plain = Actuator()
+    same = replace(plain, gain=plain.gain / stiffer, time_constant=plain.time_constant / stiffer)
+    expected = run_a(command, same)
+    assert np.max(np.abs(got - expected)[:, 0]) < 1e-5 * np.max(np.abs(expected[:, 0]))
 
 
 @given(compliance=st.floats(1e-9, 3e-8))
