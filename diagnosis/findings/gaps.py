@@ -21,9 +21,24 @@ from models.system import System
 QUIET = 0.2  # noise over a signal's rms from which on a gap relative to that rms is mostly noise, and is not judged
 
 
-def held_out(record: Record) -> Mask:
-    """Ticks that no fit has used."""
-    return residuals.withheld_ticks(record.ticks, record.plan.test.interval)
+# data of a recording itself on which its gap is judged
+INTERLEAVED, SAME = "interleaved (interpolation)", "same seconds"
+
+
+def saw_all(found: Diagnosis) -> bool:
+    """Whether fits saw the whole recording, since a gap showed in too few seconds to withhold any."""
+    return any(bool(verdict.searched.data.train.all()) for verdict in found.verdicts)
+
+
+def judging(found: Diagnosis) -> tuple[Mask, str]:
+    """The ticks of a recording by which its gap is judged, and what is said of them.
+
+    They are those that no fit has used, or all where fits saw all.
+    """
+    record = found.record
+    if saw_all(found):
+        return np.ones(record.ticks, dtype=bool), SAME
+    return residuals.withheld_ticks(record.ticks, record.plan.test.interval), INTERLEAVED
 
 
 class RecordingGaps:

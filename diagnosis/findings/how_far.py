@@ -11,7 +11,7 @@ import numpy as np
 
 from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.gaps import RecordingGaps, held_out
+from diagnosis.findings.gaps import RecordingGaps, judging
 from diagnosis.findings.series import numbers, strongest
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.findings.where import SiteTrace
@@ -32,7 +32,7 @@ LIKE_MISSED = ("damper", "column", "table", "device")
 # Times what a sensor's repeated samples can make up to which a residual may be theirs: several samples in a row err by
 # as many intervals' motion.
 MISSED = 10.0
-INTERLEAVED, OTHERS = "interleaved (interpolation)", "other recordings"  # data on which the gap was judged
+OTHERS = "other recordings"  # data on which the gap was judged
 # Share of the gap that an explanation must close: what closes less leaves the larger part of the gap open.
 SHRUNK = 0.5
 ELSEWHERE = 0.8  # the same on other recordings: 1 less the share of a gap that may be an error of the models
@@ -69,8 +69,8 @@ class Response:
 def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
     """The response gap of a recording without and with the effects found, on time that no fit has seen."""
     record = found.record
-    held = held_out(record)
-    own = RecordingGaps(found, record, held)
+    mask, where_judged = judging(found)
+    own = RecordingGaps(found, record, mask)
     nominal = bare(found, own)
     before, after = own.signals(frozenset()), own.signals(None)
     floors = own.floor()
@@ -84,7 +84,7 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
         closed=closed_share(overall(gap_before), overall(gap_after), floor),
         closed_interval=closed_interval(own, before, after, floor),
         noise_floor=floor,
-        judged_on=INTERLEAVED,
+        judged_on=where_judged,
     )
     hidden = own.loop is not None and hardly_shown(found, summary, own.between(before, after))
     told = by_readings(own, summary) if hidden else summary

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import ndimage
 
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.gaps import RecordingGaps, held_out
+from diagnosis.findings.gaps import RecordingGaps, judging
 from diagnosis.findings.series import numbers, strongest
 from diagnosis.learned.equations import Equation
 from diagnosis.learned.learn import LearnedLaw, Of
@@ -30,7 +30,7 @@ WORSE = 1.02
 # Share of the strongest part that no fit of effects must have seen, for it to be judged on that share alone; of every
 # five seconds two are withheld, so that the usual share is 0.4.
 ENOUGH = 0.2
-OTHERS, STRONGEST, INTERLEAVED = "other recordings", "strongest part", "interleaved (interpolation)"
+OTHERS, STRONGEST = "other recordings", "strongest part"
 
 
 class Gaps(NamedTuple):
@@ -80,7 +80,7 @@ def on_others(found: Diagnosis, validation: Sequence[Record]) -> Gaps | None:
 def on_itself(found: Diagnosis) -> Gaps:
     """Gaps on the strongest part, by laws learned from the rest where these hold; otherwise on the withheld seconds."""
     record = found.record
-    held = held_out(record)
+    held, where_judged = judging(found)
     part = strongest_part(found)
     if part is not None:
         unseen = part & held
@@ -88,7 +88,7 @@ def on_itself(found: Diagnosis) -> Gaps:
         found_there = gaps_of(RecordingGaps(found, record, mask), "weaker", STRONGEST)
         if found_there.learned <= WORSE * found_there.named:
             return found_there
-    return gaps_of(RecordingGaps(found, record, held), "interleaved", INTERLEAVED)
+    return gaps_of(RecordingGaps(found, record, held), "interleaved", where_judged)
 
 
 def strongest_part(found: Diagnosis) -> Mask | None:

@@ -25,6 +25,9 @@ SHORTEST, LONGEST = 6.0, 0.7  # of a beginning: seconds, and share of the test
 MOSTLY = (
     0.7  # share of what a fit leaves that a beginning must hold, so that the rest of the test teaches little
 )
+# Share of what a fit leaves, beyond noise, that must lie on either side of what it sees: with less a fit finds nothing,
+# or nothing judges it.
+ONE_SIDED = 0.01
 NEAR = 1.0  # tolerances within which fits begin: a parameter that is further away imitates an effect
 LOST = 100.0  # mean square residual in σ² from which on fitted nominal parameters mean nothing
 # Times what a rival leaves, beyond which a fit comes no nearer by further steps or at the bottom of its valley: these
@@ -77,13 +80,13 @@ class Fit:
 
     @property
     def chi(self) -> float:
-        """Σ (residual/σ)² of the withheld groups, scaled to as many as there are."""
-        held = self.reduced[~self.data.train]
+        """Σ (residual/σ)² of the groups that judge, scaled to as many as there are."""
+        held = self.reduced[self.data.judging]
         return float(np.mean(np.square(held))) * self.reduced.size
 
     @property
     def cost(self) -> float:
-        """The figure by which hypotheses are ranked: on withheld time, with the prior."""
+        """The figure by which hypotheses are ranked: on the time that judges, with the prior."""
         return self.chi + self.prior
 
 
@@ -117,6 +120,16 @@ def weights(fit: Fit) -> Array:
 def excess(fit: Fit) -> float:
     """What a fit costs beyond noise."""
     return max(0.0, fit.chi - fit.data.size) + fit.prior
+
+
+def one_sided(fit: Fit) -> bool:
+    """Whether what a fit leaves lies nearly all in the groups that it has seen, or nearly all in those that judge.
+
+    An effect that acts in a second or two only cannot be found in one half of the time and judged in the other.
+    """
+    extra = np.sum(np.square(fit.reduced), axis=1) - fit.data.size / fit.data.groups
+    seen, judging = float(extra[fit.data.train].sum()), float(extra[fit.data.judging].sum())
+    return not fit.data.train.all() and min(seen, judging) < ONE_SIDED * max(seen, judging)
 
 
 def near(fit: Fit, rival: Fit) -> bool:

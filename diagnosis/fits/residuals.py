@@ -49,7 +49,7 @@ class Data:
     sigma: Array  # (signals,) what a residual is measured by: noise, and what a good model may err by
     white: Array  # (signals,) the noise alone
     group: int  # ticks averaged
-    train: Mask  # (groups,) fitted on; the others judge
+    train: Mask  # (groups,) fitted on
     rounded: Array  # (signals,) step that a reading is rounded to, 0 for none
     catalogue: Mapping[str, Effect] = field(default_factory=lambda: CATALOGUE)  # the effects of the test
     noise: tuple[NoiseModel, ...] = ()  # of each signal; none: white, of rms `white`
@@ -98,6 +98,16 @@ class Data:
         return None if self.there.all() else ~self.there
 
     @property
+    def judging(self) -> Mask:
+        """The averaged samples (groups,) that judge fits: those that no fit sees, or all where fits see all."""
+        return self.train if self.train.all() else ~self.train
+
+    @property
+    def whole(self) -> Data:
+        """The same with nothing withheld."""
+        return replace(self, train=np.ones(self.groups, dtype=bool))
+
+    @property
     def beside(self) -> Array:
         """Variance (signals,) that residuals may have beside the noise: of what a model errs by, and of rounding."""
         return np.asarray(self.sigma**2 - self.white**2)
@@ -133,9 +143,9 @@ class Data:
 
     @cached_property
     def energy(self) -> float:
-        """Σ (reading/σ)² of the withheld groups, scaled to as many as there are: that of a prediction of nothing."""
+        """Σ (reading/σ)² of the groups that judge, scaled to as many as there are: that of a prediction of nothing."""
         raw = np.where(self.there, self.part.measured, 0.0) / self.sigma
-        held = self.whitened(raw)[~self.train]
+        held = self.whitened(raw)[self.judging]
         return float(np.mean(np.square(held))) * self.groups * self.sigma.size
 
     def whitened(self, raw: Array) -> Array:

@@ -46,8 +46,19 @@ class Search:
 
 
 def search(data: Data, scales: Scales) -> Search:
-    """Commission a part, select effects one by one, exchange and prune them, and fit what else might be."""
+    """What was found in a part, with nothing withheld where what it leaves acts for a short time only."""
     bare = settling.settled(fitting.fit(data, {}))
+    if worth.is_gap(bare) and fitting.one_sided(bare):
+        return searched(settling.settled(fitting.fit(data.whole, {})), scales)
+    found = searched(bare, scales)
+    left = found.chosen
+    if left.names and leaves(left, model_error(left)) and fitting.one_sided(left):
+        return searched(settling.settled(fitting.fit(data.whole, {})), scales)
+    return found
+
+
+def searched(bare: Fit, scales: Scales) -> Search:
+    """Select effects one by one beside the fit without any, exchange and prune them, and fit what else might be."""
     first = candidates.best_laws(bare, scales) if worth.is_gap(bare) else []
     if not (first and worth.is_worth(bare, bare, first[0])):  # under noise that is a gap no effect shows
         bare, instead = settling.instead_of_colour(bare, scales)

@@ -59,7 +59,7 @@ def is_worth(bare: Fit, before: Fit, after: Fit) -> bool:
 
 def moving(fit: Fit) -> float:
     """What a fit costs beyond noise, readings that are off by a constant aside."""
-    held = fit.reduced[~fit.data.train]
+    held = fit.reduced[fit.data.judging]
     constant = float(np.sum(np.square(held.mean(axis=0)))) * len(fit.reduced)
     return max(0.0, excess(fit) - constant)
 

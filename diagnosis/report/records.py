@@ -113,7 +113,8 @@ class LearnedGap(Entry):
     closed: Number = noted("Share of the gap above the noise that closes with both")
     sites: tuple[Site, ...] = noted("Where something was learned")
     judged_on: str = noted(
-        "Data not used: other recordings, the strongest part of this one, or pieces between those used (interpolation)"
+        "Data not used: other recordings, the strongest part of this one, or pieces between those used "
+        "(interpolation); or the same seconds, where a gap shows in too few to withhold any"
     )
 
 
@@ -131,7 +132,9 @@ class HowFar(Entry):
     closed: Number = noted("Share of the gap above the noise that closes")
     closed_interval: Ends | None = noted("Its interval of 90 %, or its range over the recordings given")
     noise_floor: Number = noted("Overall gap that the sensors' noise alone makes")
-    judged_on: str | None = noted("The data, not used for the fit, on which this was judged")
+    judged_on: str | None = noted(
+        "The data, not used for the fit, on which this was judged, or the same seconds where a gap shows in few"
+    )
     learned: LearnedGap | None = noted(
         "With what was learned of what no effect explains", default=None, absent=Absent.LEFT_OUT
     )

@@ -29,6 +29,7 @@ STATUS = {
 QUIET = ("no_gap", "within_tolerances")  # statuses that leave nothing to explain
 JUDGED = {
     "interleaved (interpolation)": "On seconds between those used for fitting",
+    "same seconds": "On the seconds used for fitting, as the gap shows in few",
     "other recordings": "On the recordings given for validation",
     "held-out time windows": "On data not used for fitting",
     "recordings given": "On the recordings given for validation",
@@ -37,6 +38,7 @@ LEARNED_ON = {
     "other recordings": "the recordings given for validation",
     "strongest part": "the strongest part of this recording, which was not used for it",
     "interleaved (interpolation)": "seconds between those used for it (interpolation)",
+    "same seconds": "seconds of which some were used for it",
 }
 # Share of the gap from which a site is named in the verdict: it causes more than all others together.
 DOMINANT = 0.5

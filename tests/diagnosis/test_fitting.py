@@ -246,3 +246,17 @@ def test_sensors_read_a_motion_that_is_kept_as_they_read_one_that_is_played(
     played = fitting.at(data_of(cases, "b"), effects | drift, z)
     assert np.array_equal(kept.reduced, played.reduced)
     assert not np.array_equal(kept.reduced, fitting.at(data, effects, z).reduced)
+
+
+@pytest.mark.parametrize(("seen", "judging", "one"), [(4.0, 0.0, True), (0.0, 4.0, True), (4.0, 4.0, False)])
+def test_a_gap_on_one_side_of_what_a_fit_sees_is_told(
+    cases: Cases, seen: float, judging: float, one: bool
+) -> None:
+    data = data_of(cases, "a")
+    noise = np.sqrt(np.where(data.train, 1.0 + seen, 1.0 + judging))[:, None] * np.ones(data.sigma.size)
+    fit = Fit(data, {}, np.zeros(len(data.part.nuisances)), noise)
+    assert fitting.one_sided(fit) is one
+    whole = dataclasses.replace(fit, data=data.whole)
+    assert not fitting.one_sided(whole)
+    assert whole.chi == pytest.approx(float(np.sum(noise**2)))
+    assert fit.chi == pytest.approx((1.0 + judging) * noise.size)

@@ -190,7 +190,7 @@ def test_a_named_site_keeps_its_trace_where_something_is_left_there(
 
 
 def test_withheld_time_is_between_15_and_60_percent_of_the_test(cases: Cases) -> None:
-    mask = gaps.held_out(cases.record())
+    mask, _ = gaps.judging(Diagnosis(cases.record()))
     assert 0.15 < np.mean(mask) < 0.6
     assert not mask.all()
 
@@ -203,7 +203,7 @@ def test_the_closed_share_is_that_of_the_gap_above_the_noise() -> None:
 
 
 def test_a_diverging_simulation_is_reported_as_a_gap(rubbing: Diagnosis) -> None:
-    judge = gaps.RecordingGaps(rubbing, rubbing.record, gaps.held_out(rubbing.record))
+    judge = gaps.RecordingGaps(rubbing, rubbing.record, gaps.judging(rubbing)[0])
     assert judge.loop is not None
     systems = rubbing.systems()
     wild_systems = systems | {MASTER: systems[MASTER].moved("actuator", delay=0.2)}

@@ -11,7 +11,7 @@ import pytest
 from scipy import signal
 
 from diagnosis.diagnose import own_noise
-from diagnosis.findings import how_far, report, verdict
+from diagnosis.findings import gaps, how_far, report, verdict
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import residuals
 from diagnosis.fits.scales import Scales
@@ -128,7 +128,7 @@ def test_an_effect_that_hardly_closes_the_gap_is_not_an_explanation(cases: Cases
         closed=0.2,
         closed_interval=None,
         noise_floor=0.01,
-        judged_on=how_far.INTERLEAVED,
+        judged_on=gaps.INTERLEAVED,
     )
     assert not how_far.shrinks(found, far)
     assert how_far.shrinks(found, replace(far, closed=0.7))
@@ -160,7 +160,7 @@ def test_the_response_shows_effects_that_change_it_by_more_than_noise(
         closed=0.0,
         closed_interval=None,
         noise_floor=0.010,
-        judged_on=how_far.INTERLEAVED,
+        judged_on=gaps.INTERLEAVED,
     )
     named = Diagnosis(cast(Record, None), verdicts=[verdict.judge(drifting)])
     assert how_far.hardly_shown(named, far, changed) is hidden

@@ -55,6 +55,16 @@ def test_an_effect_is_found_with_its_parameters(
         assert estimate(report, effect, name) == pytest.approx(values[name], rel=error)
 
 
+def test_an_effect_that_acts_in_one_second_only_is_found_with_no_second_withheld(cases: Cases) -> None:
+    report = cases.report(
+        {"actuator.velocity_limit": {"velocity": 0.025}}
+    )  # 32 mm/s in the third, 21 elsewhere
+    assert (report["status"], named(report)) == ("explained", ["actuator.velocity_limit"])
+    assert estimate(report, "actuator.velocity_limit", "velocity") == pytest.approx(0.025, rel=0.01)
+    assert report["how_far"]["judged_on"] == "same seconds"
+    assert report["how_far"]["closed"] > 0.9
+
+
 STOP: Effects = {"damper.stroke_stop": {"stroke": 0.04, "stiffness": 2000.0}}
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from diagnosis.findings.which import described
-from diagnosis.fits.fitting import Fit
+from diagnosis.fits.fitting import TIED, Fit
+from diagnosis.fits.laws import best
 from diagnosis.fits.trade import simplest, tied
 from laboratories.effects import CATALOGUE
 from models.registry import Array
@@ -42,3 +45,18 @@ def test_fits_with_equal_costs_and_different_residuals_are_not_tied() -> None:
 def test_a_description_is_written_with_its_laws() -> None:
     assert described(fit(SIDED)) == "damper.friction (law by direction and speed)"
     assert described(fit(PAIR)) == "damper.friction with sensor.column_force.bias"
+
+
+def test_another_law_with_as_many_parameters_must_fit_better_and_one_with_more_much_better() -> None:
+    play = CATALOGUE["actuator.backlash"]
+    dry, before, greased = (fit({play.name: play.under(law, {"width": 1e-4})}) for law in range(3))
+
+    def costing(law: Fit, cost: float) -> Fit:
+        return replace(law, z=np.array([np.sqrt(cost)]))
+
+    first, near, far = costing(dry, 16.0), costing(before, 15.0 - TIED + 2.0), costing(before, 15.0 - TIED)
+    assert not best.whole(first)  # leaves nothing that is seen, but has a parameter four tolerances off
+    assert best.whole(far)
+    assert best.simplest(first, [near]) is first
+    assert best.simplest(first, [far]) is far
+    assert best.simplest(first, [costing(greased, 15.0 - TIED)]) is first

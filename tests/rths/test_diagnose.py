@@ -14,7 +14,7 @@ import pytest
 from common.errors import InterlockError
 from common.recording.reader import read
 from common.recording.run import PEAKS
-from diagnosis.findings.gaps import held_out
+from diagnosis.fits.residuals import withheld_ticks
 from diagnosis.recorded import record
 from diagnosis.report.schema import schema
 from tests.diagnosis.cases import Cases, play, short
@@ -92,7 +92,7 @@ def test_a_report_on_standard_output_is_that_of_a_file(
 def left(measured: Path, simulated: Path) -> float:
     """The gap of the response between two recordings, on the time that no fit used."""
     one, other = (record.build(read(path)) for path in (measured, simulated))
-    held, gaps = held_out(one), []
+    held, gaps = withheld_ticks(one.ticks, one.plan.test.interval), []
     for name in one.responses:
         there, shown = one.signals[name][held], other.signals[name][held]
         gaps.append(float(np.sqrt(np.mean((there - shown) ** 2))) / float(np.sqrt(np.mean(there**2))))

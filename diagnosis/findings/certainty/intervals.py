@@ -123,7 +123,7 @@ def covariance(fit: Fit) -> Array:
 
 def refined(fit: Fit) -> Fit:
     """A fit moved to the best parameters for all rows, those included that selection did not see."""
-    data = replace(fit.data, train=np.ones(fit.data.groups, dtype=bool))
+    data = fit.data.whole
     return fitting.moved(data, replace(fit, data=data), STEPS, None, fitting.weights(fit))
 
 

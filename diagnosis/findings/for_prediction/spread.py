@@ -13,7 +13,7 @@ from common.reality.spread import ByRole, SeenRange, Spread, UncertainParameter
 from common.roles import MASTER
 from diagnosis.findings.certainty.intervals import covariance
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.gaps import RecordingGaps, held_out
+from diagnosis.findings.gaps import RecordingGaps, judging
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
@@ -139,7 +139,7 @@ def band(series: Array, interval: float) -> tuple[float, float]:
 
 def left(found: Diagnosis) -> Iterator[tuple[str, str, float]]:
     """Role, signal and share of its envelope that is left of every signal that the corrected models predict."""
-    own = RecordingGaps(found, found.record, held_out(found.record))
+    own = RecordingGaps(found, found.record, judging(found)[0])
     corrected = found.corrected(plans=found.record.plans)
     if own.loop is not None:
         linked = bool(found.link)

@@ -9,12 +9,13 @@ import numpy as np
 from scipy.optimize import minimize
 
 from diagnosis.fits import fitting
-from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.fitting import TIED, Fit, excess
 from diagnosis.fits.hypothesis import Problem, Values
 from diagnosis.fits.laws.specimen import SLOW, follow, path
 from diagnosis.fits.laws.starts import starts
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import remaining
+from diagnosis.fits.worth import SUSPICIOUS
 from laboratories.effects.effect import Effect
 from models.registry import Array
 
@@ -25,7 +26,7 @@ LEADING = 4  # of all laws, those that are fitted to their end
 STEPS, ROUNDS = 8, 2  # of such a fit
 TURNS, EVALUATIONS = 2, 60  # of the simplex with the effects' parameters, each followed by a fit of all
 LOGARITHMIC, LINEAR = 0.06, 0.4  # first edges of the simplex, of the logarithm and of a shape over its size
-SURELY = 25.0  # cost by which another law must be better: 5 standard deviations squared
+SURELY = 25.0  # cost by which a law with more free parameters must be better: 5 standard deviations squared
 FARTHEST = 30.0  # times what the best fit leaves: one that leaves more is under no law the right one
 SLIGHT = (
     0.02  # systematic residual over noise below which one law is as good as another: it can hardly be seen
@@ -36,18 +37,23 @@ BETTER = 0.9  # of what is left beyond noise: less of it is worth another law th
 def in_best_laws(fits: list[Fit]) -> list[Fit]:
     """The fits, best first, with the effect that came last under that law of its mechanism that leaves least.
 
-    Nothing is tried where the best fit leaves too little to be seen. The best one is first fitted to its end under its
-    own law: another law would else explain what that fit has not reached yet.
+    Nothing is tried where the best fit leaves nothing. The best one is first fitted to its end under its own law:
+    another law would else explain what that fit has not reached yet.
     """
-    if not fits or remaining(fits[0]) < SLIGHT:
+    if not fits or whole(fits[0]):
         return fits
     if len(last(fits[0]).laws) > 1:
         fits = sorted([fitting.polished(fits[0]), *fits[1:]], key=cost)
-        if remaining(fits[0]) < SLIGHT:
+        if whole(fits[0]):
             return fits
     others = raced([item for item in fits if excess(item) <= FARTHEST * excess(fits[0])])
     better = sorted((others.get(item.names[-1], item) for item in fits), key=cost)
     return ending(better, fits)
+
+
+def whole(fit: Fit) -> bool:
+    """Whether a fit leaves too little to be seen, with nominal parameters that stand in for nothing."""
+    return remaining(fit) < SLIGHT and fit.prior <= SUSPICIOUS
 
 
 def ending(better: list[Fit], fits: list[Fit]) -> list[Fit]:
@@ -85,10 +91,16 @@ def fitted(start: Fit, steps: int, rounds: int) -> Fit:
 def simplest(first: Fit, others: list[Fit]) -> Fit:
     """The first fit, or one under another law: with more free parameters only where it is much better."""
     best = first
-    for item in sorted(others, key=lambda item: len(Problem(item.data, item.values).frees)):
-        if item.cost < best.cost - SURELY and excess(item) < BETTER * excess(best):
+    for item in sorted(others, key=frees):
+        by = SURELY if frees(item) > frees(best) else TIED
+        if item.cost < best.cost - by and excess(item) < BETTER * excess(best):
             best = item
     return best
+
+
+def frees(fit: Fit) -> int:
+    """How many parameters of effects a fit moves."""
+    return len(Problem(fit.data, fit.values).frees)
 
 
 def begun(fit: Fit) -> list[Fit]:
