@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -16,21 +16,23 @@ from common.terminal.telling import Tell, untold
 from diagnosis.findings import logger, report, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors import readings, staircases
+from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.sensors.staircases import Stairs
-from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
+from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, shaken, sharpest
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import search
+from diagnosis.fits.search import Search, search
 from diagnosis.learned.learn import learn
 from diagnosis.recorded import link, link_effects
-from diagnosis.recorded.divided import driven, parts_of
+from diagnosis.recorded.divided import BUILDING, driven, parts_of, used
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.joined import joined, refuse_others
 from diagnosis.recorded.link import LinkFinding
 from diagnosis.recorded.logged_building import LoggedBuilding, logged
 from diagnosis.recorded.parts import Building, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
+from models.registry import Array
 from models.system import System
 
 # s. A shorter recording is not judged: it holds less than one period of the default building's first mode (2 Hz).
@@ -120,13 +122,11 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         found = verdicts[-1].search
         if isinstance(found.data.part, LoggedBuilding):
             late = found.data.part.late(found.chosen.z)
-    searches = [item.search for item in verdicts]
-    final, held = [item.data for item in searches], readings.held(record, steps)
-    loud, sharp = (readings.levels(final, list(map(of, searches))) for of in (heard, sharpest))
-    sensors = [
-        *readings.findings(record, sharp, rounded, steps, logged=late is not None),
-        *staircases.findings(hidden, record, logged=late is not None),
-    ]
+    held = readings.held(record, steps)
+    noisy = readings.findings(record, noise(verdicts, sharpest), rounded, steps, logged=late is not None)
+    verdicts, noisy = machines_first(record, verdicts, noisy)
+    loud = noise(verdicts, heard)
+    sensors = [*noisy, *staircases.findings(hidden, record, logged=late is not None)]
     result = Diagnosis(
         record,
         verdicts,
@@ -146,6 +146,26 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         [law for verdict in verdicts if verdict.outcome in UNNAMED for law in learn(verdict.search.chosen)],
     )
     return replace(result, warnings=[*result.warnings, *logger.remarks(result)])
+
+
+def noise(verdicts: Sequence[PartVerdict], of: Callable[[Search], Array]) -> dict[str, float]:
+    """Rms noise of every reading by signal, of each part as `of` says."""
+    searches = [item.search for item in verdicts]
+    return readings.levels([item.data for item in searches], list(map(of, searches)))
+
+
+def machines_first(
+    record: Record, verdicts: Sequence[PartVerdict], noisy: Sequence[SensorFinding]
+) -> tuple[list[PartVerdict], list[SensorFinding]]:
+    """The verdicts and the noise found on sensors, where noise that follows from a machine's motion is none."""
+    signal = {item: record.catalogue[item.effect].signal for item in noisy if item.parameter == "rms"}
+    usual = {name: item.usual for item, name in signal.items()}
+    result, none = [], set[str]()
+    for verdict in verdicts:
+        moved = shaken(verdict, usual)
+        none |= set(verdict.search.data.part.signals if moved else ())
+        result.append(moved or verdict)
+    return result, [item for item in noisy if signal.get(item) not in none]
 
 
 def seen(
@@ -268,6 +288,9 @@ def not_recorded(record: Record) -> list[str]:
             result.append(f"{command} was not recorded, so the actuator cannot be judged.")
     if record.run.has("master") and record.run.has("slave") and not exchange_known(record.run):
         result.append("The recording holds no message numbers or time stamps, so the link cannot be judged.")
+    unused = [name for name in used(record) if not record.has(name)]
+    if record.has(*BUILDING) and unused and not record.plan.foreign:
+        result.append(f"The building cannot be judged without {' and '.join(unused)}.")
     missing = [name for lab in record.labs for name in lab.measured if not record.has(name)]
     if missing:
         result.append(

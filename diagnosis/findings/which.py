@@ -68,8 +68,9 @@ def trusted(
     if all(verdict.outcome not in ("partly", "unknown") for verdict in found.verdicts):
         return min(costs, trust.EXPLAINED.probability(signs))
     near = float(np.prod([trust.share_likeliest(verdict) for verdict in named]))
-    shares = [trust.share_named(item.search.explained) for item in named if item.outcome == "partly"]
-    return min(near, trust.PARTLY.probability(signs), *shares)
+    left = [item for item in named if item.outcome == "partly"]
+    shares = [trust.share_named(item.search.explained) for item in left]
+    return trust.less_by_freedom(min(near, trust.PARTLY.probability(signs), *shares), left)
 
 
 def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:

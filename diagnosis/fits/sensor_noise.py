@@ -42,6 +42,8 @@ SLOWER = (1, 4, 16)  # averaged samples in the sums by which that is decided
 # Motion elsewhere over that of the quiet part, from which on noise that is as loud in both does not follow it.
 VARIED = 2.0
 LEAST = 500  # averaged samples without which no flexible model is asked
+# Noise at its loudest frequency over that at the highest ones, up to which it counts as white beside coloured noise.
+FLAT = 2.0
 LOWER = 0.9  # of the noise first found, from which on a lower one is believed
 
 
@@ -183,19 +185,24 @@ def in_common(fit: Fit) -> Data:
     """The data of a fit with noise of the colour that all readings have, each at its level of the highest frequencies.
 
     A logger treats its channels alike, so that what one of them has beyond that colour need not be noise. It is white
-    where the noise of any reading is.
+    unless most readings have coloured noise; a white one among these hides the colour behind the steps of a converter.
     """
     white, models = whitened(fit), remodelled(fit).noise
+    if not coloured(fit.data):  # a level known from elsewhere stays
+        white = residuals.measured_by(white, np.minimum(white.white, fit.data.white))
     pairs = [(item, level) for item, level in zip(models, white.white, strict=True) if level > 0.0]
-    shapes = [item.density / level**2 for item, level in pairs if item.density is not None]
-    if not shapes or len(shapes) < len(pairs):
+    shapes = [(item, level) for item, level in pairs if loudness(item, level) > FLAT]
+    if 2 * len(shapes) <= len(pairs):
         return white
-    shape, rms = np.min(shapes, axis=0), min(item.rms / level for item, level in pairs)
+    shape = np.min([item.density / level**2 for item, level in shapes if item.density is not None], axis=0)
+    rms = min(item.rms / level for item, level in shapes)
     noise = tuple(
         replace(item, rms=float(rms * level), density=level**2 * shape)
+        if loudness(item, level) > FLAT
+        else item
         for item, level in zip(models, white.white, strict=True)
     )
-    return residuals.measured_by(replace(white, noise=noise), rms * white.white)
+    return residuals.measured_by(replace(white, noise=noise), np.array([item.rms for item in noise]))
 
 
 def share(data: Data) -> float:
@@ -216,11 +223,14 @@ def shares(data: Data) -> Array:
 def loudest(fit: Fit) -> Array:
     """Largest rms density (signals,) of each sensor's noise over that at the highest frequencies; one if white."""
     white = residuals.noise(fit.data.residual(hypothesis.lay(fit.data, fit.z, fit.values)))
-    result = np.ones(white.size)
-    for place, item in enumerate(fit.data.noise):
-        if item.density is not None:
-            result[place] = math.sqrt(float(item.density.max())) / max(float(white[place]), 1e-300)
-    return result
+    if not fit.data.noise:
+        return np.ones(white.size)
+    return np.array([loudness(item, float(level)) for item, level in zip(fit.data.noise, white, strict=True)])
+
+
+def loudness(item: NoiseModel, level: float) -> float:
+    """Largest rms density of a noise over its `level` at the highest frequencies, one where it is white."""
+    return 1.0 if item.density is None else math.sqrt(float(item.density.max())) / max(level, 1e-300)
 
 
 class Foreseen(NamedTuple):

@@ -106,6 +106,16 @@ def test_signals_that_were_not_recorded_are_reported_and_the_others_judged(cases
     assert any("actuator_command" in text for text in warnings)
 
 
+def test_a_building_that_cannot_be_judged_is_reported(cases: Cases) -> None:
+    whole = run_of(cases)
+    judged = record.build(whole)
+    found = record.build(without(whole, "master", "damper_force_used"))
+    sentence = "The building cannot be judged without damper_force_used."
+    assert "structure" not in [part.name for part in parts_of(found)]
+    assert sentence in not_recorded(found)
+    assert sentence not in not_recorded(judged)
+
+
 def test_a_recording_of_one_laboratory_is_judged_alone(cases: Cases) -> None:
     run = run_of(cases)
     del run.columns["master"], run.sequences["master"]

@@ -10,7 +10,7 @@ from scipy import signal
 
 from diagnosis.diagnose import doubted, examine
 from diagnosis.findings import where
-from diagnosis.findings.certainty.trust import share_named
+from diagnosis.findings.certainty.trust import less_by_freedom, share_named
 from diagnosis.findings.report import status_of
 from diagnosis.findings.verdict import PartVerdict, allowed, artefact, at_end, farthest, judge, lone_noise
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
@@ -31,6 +31,7 @@ MORE, AR1 = (
     3.0,
     np.sqrt(1.0 - 0.95**2),
 )  # times a sensor's noise; what makes noise of this correlation one of rms one
+STEP = 4e-5  # m, of the converter that gives a table its command
 SHAKEN = 1e-5  # m, of a table: the noise of its displacement sensor
 RESONANCE, WANDER = 0.3, 3e-5  # Hz, of the default damper; m, fifteen times the noise of its stroke's sensor
 
@@ -66,6 +67,19 @@ def test_effects_that_leave_6_percent_of_a_gap_are_as_probable_as_a_stand_in() -
     assert share_named(0.94) == pytest.approx(0.5)
     assert share_named(1.0) == pytest.approx(1.0)
     assert share_named(0.6) < share_named(0.95)
+
+
+def test_what_a_law_of_many_parameters_explains_says_less_for_it() -> None:
+    def probability(**more: float) -> float:
+        values = {"damper.friction": {"force": 3.0, "velocity": 1e-6, **more}}
+        chosen = Fit(DATA, values, np.zeros(0), NOISY)
+        return less_by_freedom(
+            0.5, [PartVerdict(Search(DATA, fit(NOISY), chosen, ()), "partly", 0.5, (), ())]
+        )
+
+    shapes = {"asymmetry": 0.2, "drop": 0.3, "speed": 0.02, "law": 1.0}
+    assert probability() == pytest.approx(0.5, abs=0.03)
+    assert 0.3 < probability(**shapes) < probability() - 0.05
 
 
 def test_errors_of_readings_that_leave_a_tenth_of_a_gap_are_not_its_cause() -> None:
@@ -200,6 +214,19 @@ def test_the_site_of_a_gap_is_sought_beside_the_noise_that_all_readings_have(cas
     assert where.culprits(white_noise) == ("table",)
 
 
+def test_steps_of_one_reading_do_not_hide_the_colour_that_the_others_have(cases: Cases) -> None:
+    whole = behind_logger(cases.record())
+    coarse = whole.signals["damper_stroke"] + 20.0 * whole.labs[1].noise["damper_stroke"] * white(
+        53, whole.ticks
+    )
+    creeping = whole.signals["table_displacement"] + 3e-4 * np.abs(np.sin(0.004 * np.arange(whole.ticks)))
+    bare = bare_fit(
+        replace(whole, signals=whole.signals | {"damper_stroke": coarse, "table_displacement": creeping})
+    )
+    white_noise = fitting.at(sensor_noise.whitened(bare), {}, bare.z)
+    assert where.culprits(white_noise)[0] == "sensor.table_displacement"
+
+
 def test_loud_slow_noise_of_several_readings_is_noise(cases: Cases) -> None:
     whole = cases.record()
     found = judged(wandering(whole, *whole.labs[1].measured))
@@ -219,6 +246,27 @@ def test_noise_of_several_readings_that_follows_from_one_motion_is_an_unknown_ef
     )
     assert (found.outcome, found.doubted) == ("unknown", "")
     assert where.culprits(found.search.chosen) == ("table",)
+
+
+def test_noise_that_shakes_a_whole_table_is_none_of_its_accelerometer(cases: Cases) -> None:
+    whole = cases.record()
+    part = lab_b(whole)
+    command = next(iter(part.inputs))
+    coarse = STEP * np.round(part.inputs[command] / STEP)
+    change = part.replaced(inputs=part.inputs | {command: coarse})
+    system = residuals.prepare(part, whole).system
+    more = dict(zip(part.signals, (change.predict(system) - part.predict(system)).T, strict=True))
+    felt = {"table_acceleration": np.std(more["table_acceleration"]) * white(47, whole.ticks)}
+    shaken, noisy = (
+        examine(
+            replace(whole, signals=whole.signals | {name: whole.signals[name] + x for name, x in one.items()})
+        )
+        for one in (more, felt)
+    )
+    verdict = next(item for item in shaken.verdicts if item.search.data.part.name == part.name)
+    assert (verdict.outcome, shaken.readings) == ("unknown", [])
+    assert where.culprits(verdict.search.chosen)[0] == "table"
+    assert [item.effect for item in noisy.readings] == ["sensor.table_acceleration.noise"]
 
 
 def test_a_gap_that_a_nominal_parameter_took_upon_itself_lies_at_its_machine(cases: Cases) -> None:

@@ -8,7 +8,7 @@ laboratories whose effects are known (ADR 0052).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,8 @@ import numpy as np
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import REST, PartVerdict
 from diagnosis.fits import worth
+from diagnosis.fits.laws.best import BETTER
+from diagnosis.fits.trade import freedom
 from diagnosis.fits.unexplained import MATERIAL, remaining
 
 LEAST_TRACE = 0.1  # trace over noise below which a smaller one makes no difference: nothing can be seen of it
@@ -42,6 +44,18 @@ PARTLY = Weights(-0.569, {"clear": 0.225, "names": -0.113})
 def share_named(explained: float) -> float:
     """Probability that the effects named are the true ones, by the share of a gap's energy that they explain."""
     return REST / (REST + max(1.0 - explained, 0.0))
+
+
+def less_by_freedom(probability: float, verdicts: Sequence[PartVerdict]) -> float:
+    """The probability of effects that leave something, less by the parameters that they move beside the first of each.
+
+    A stand-in leaves less with every parameter that it can choose, so that what it explains says less: by as much as a
+    law with more parameters must leave less to be preferred, the odds fall with each.
+    """
+    counts = [freedom(verdict.search.chosen) for verdict in verdicts]
+    further = sum(max(parameters - effects, 0) for parameters, effects in counts)
+    odds = probability * BETTER**further
+    return odds / (odds + 1.0 - probability)
 
 
 def share_likeliest(verdict: PartVerdict) -> float:

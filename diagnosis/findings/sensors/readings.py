@@ -46,7 +46,12 @@ class SensorFinding(NamedTuple):
     parameter: str
     value: float
     interval: tuple[float, float]
-    ratio: float  # of the added noise to the sensor's usual one
+    ratio: float  # of the sensor's whole noise to its usual one, of a step's error to the usual noise
+
+    @property
+    def usual(self) -> float:
+        """Rms noise that a sensor which is too noisy has otherwise."""
+        return self.value / math.sqrt(self.ratio**2 - 1.0)
 
 
 def read_by(record: Record) -> list[str]:
