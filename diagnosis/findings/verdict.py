@@ -13,7 +13,8 @@ from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import TOLERANCES, Problem
 from diagnosis.fits.residuals import Data
-from diagnosis.fits.search import Search, exchanged_pair
+from diagnosis.fits.search import Search, exchanged_pair, likeliest
+from diagnosis.fits.threads import each
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps, leaves, model_error
 from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN
@@ -37,6 +38,7 @@ OWN = 0.4
 # reading of its laboratory has more than QUIET, or all others have so many times less. Pink noise of a test has less
 # than LONE.
 LONE, QUIET = 10.0, 2.0
+AGAIN = 6  # steps of a fit under another noise, from where it was
 # Standard deviations of Σ z² above its mean from which on the nominal parameters speak against the effects beside them.
 STRAINED = 3.0
 # A stand-in rarely explains more than 0.94 of a gap's energy, the true mechanism under another law rarely less: on the
@@ -81,6 +83,12 @@ def judge(search: Search) -> PartVerdict:
         bare, name = heard_as_noise(search)
         outcome = without_effects(bare)
         return PartVerdict(bare, outcome, 1.0, (), (), doubted=name if outcome == "unknown" else "")
+    search, name = beside_lone_noise(search)
+    return replace(with_effects(search), doubted=name)
+
+
+def with_effects(search: Search) -> PartVerdict:
+    """The verdict on a part for which a search found effects."""
     outcome = how_well(search)
     if outcome == "unknown" or (outcome == "partly" and imitated(search)):
         return unnamed(search)
@@ -206,6 +214,22 @@ def lone_noise(fit: Fit) -> str:
     planned = fit.data.planned
     expected = planned is not None and fit.data.noise[place].rms <= planned[place]
     return "" if expected else fit.data.part.signals[place]
+
+
+def beside_lone_noise(search: Search) -> tuple[Search, str]:
+    """A search with effects under noise that all readings have, where a lone one with loud slow noise hides a gap.
+
+    With it goes the reading of which that is doubtful, empty where there is none or the effects explain it as well.
+    """
+    name = lone_noise(search.chosen)
+    if not name:
+        return search, ""
+    data = sensor_noise.in_common(search.chosen)
+    fits = (search.commissioned, search.chosen, *search.alternatives)
+    bare, chosen, *others = each(lambda fit: fitting.fit(data, fit.values, fit.z, AGAIN, rounds=1), fits)
+    others.sort(key=lambda fit: fit.cost)
+    common = likeliest(Search(data, bare, chosen, tuple(others)))
+    return (search, "") if how_well(common) == "explained" else (common, name)
 
 
 def in_common_noise(search: Search) -> Search:

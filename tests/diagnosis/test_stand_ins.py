@@ -171,6 +171,18 @@ def test_slow_noise_that_the_plan_states_is_no_unknown_effect(cases: Cases) -> N
         assert lone_noise(bare_fit(wandering(record, "damper_stroke", wander=WANDER))) == name
 
 
+def test_loud_slow_noise_of_a_single_reading_beside_an_effect_may_be_an_unknown_one(cases: Cases) -> None:
+    whole = cases.record({"table.gain": {"factor": 1.1}})
+
+    def verdict(*names: str) -> PartVerdict:
+        read = wandering(whole, *names, wander=10.0 * WANDER)
+        return judge(search(residuals.prepare(lab_b(read), read), Scales(read)))
+
+    alone, alike = verdict("damper_stroke"), verdict(*whole.labs[1].measured)
+    assert (alone.effects, alone.outcome, alone.doubted) == (("table.gain",), "partly", "damper_stroke")
+    assert (alike.effects, alike.outcome, alike.doubted) == (("table.gain",), "explained", "")
+
+
 def behind_logger(whole: Record) -> Record:
     """The record with slow noise of one colour on all readings of the slave's laboratory."""
     lab = whole.labs[1]
