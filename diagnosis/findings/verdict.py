@@ -10,8 +10,8 @@ import numpy as np
 
 from diagnosis.findings.sites.likely import APART, ranked
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
-from diagnosis.fits.fitting import Fit
-from diagnosis.fits.hypothesis import TOLERANCES, Problem
+from diagnosis.fits.fitting import Fit, at_end
+from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, exchanged_pair, likeliest
 from diagnosis.fits.threads import each
@@ -51,7 +51,6 @@ NEARLY = 0.99
 FALSE = 0.06
 # Distance from the bound, in tolerances, within which a nominal parameter counts as pinned to it.
 PINNED = 1e-3
-END = 1e-6  # of its range, within which an effect's parameter counts as at its end
 
 
 @dataclass(frozen=True)
@@ -367,20 +366,6 @@ def pinned(fit: Fit) -> tuple[str, ...]:
     """Nominal parameters that a fit leaves at the bound of their range."""
     far = np.abs(fit.z) > TOLERANCES - PINNED
     return tuple(item.name for item, yes in zip(fit.data.part.nuisances, far, strict=True) if yes)
-
-
-def at_end(fit: Fit) -> tuple[str, ...]:
-    """Effects of a fit of which a parameter that is no shape lies at the end of what is believed of it."""
-    problem = Problem(fit.data, fit.values)
-    low, high = problem.bounds()
-    places = problem.place(fit.values, fit.z)
-    edge = END * (high - low)
-    far = (places <= low + edge) | (places >= high - edge)
-    return tuple(
-        item.effect
-        for item, yes in zip(problem.frees, far[fit.z.size :], strict=True)
-        if yes and not item.parameter.shape
-    )
 
 
 def certainty(search: Search) -> float:

@@ -6,6 +6,8 @@ parameters give way is read off a linear projection; the most promising are then
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from diagnosis.fits import contact, fitting
@@ -16,7 +18,7 @@ from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import ScreenedEffect, screen
 from diagnosis.fits.threads import each
-from diagnosis.fits.unexplained import MATERIAL, remaining
+from diagnosis.fits.unexplained import MATERIAL, leaves, remaining
 from diagnosis.fits.worth import LOUD
 
 # Of what a fit leaves: an effect that promises more is near the cause. Of two tables with play behind their loop the
@@ -123,6 +125,20 @@ def exchanged(fit: Fit, scales: Scales) -> Fit:
     return fit
 
 
+def in_other_laws(fit: Fit) -> Fit:
+    """The fit with each effect but the last under that law of its mechanism that leaves least.
+
+    While an effect was missing, one that came before it was held against its other laws beside what that left. Models
+    of specimens are left out, which follow all of a force.
+    """
+    for name in fit.names[:-1]:
+        if len(fit.data.catalogue[name].laws) > 1 and leaves(fit):
+            rest = {key: values for key, values in fit.values.items() if key != name}
+            (better,) = in_best_laws([replace(fit, values=rest | {name: fit.values[name]})], modelled=False)
+            fit = replace(better, values={key: better.values[key] for key in fit.names})
+    return fit
+
+
 def alternatives(fit: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, ...]:
     """Fits in which one effect is exchanged for another, best first; `first` are those with one only."""
     if len(fit.names) < 2:
@@ -130,5 +146,6 @@ def alternatives(fit: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, ...]:
     result: list[Fit] = []
     for name in fit.names:
         others = extended(without(fit, name), scales, known=fit)
+        others = in_best_laws(others, modelled=False) if leaves(fit) else others
         result += [other for other in others if set(other.names) != set(fit.names)]
     return tuple(sorted(result, key=lambda item: item.cost))

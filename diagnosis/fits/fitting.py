@@ -34,6 +34,7 @@ LOST = 100.0  # mean square residual in σ² from which on fitted nominal parame
 # have taken away a third of what a fit left at most.
 CLOSE = 3.0
 TIED = 9.0  # cost by which hypotheses differ that can be told apart: 3 standard deviations squared
+END = 1e-6  # of its range, within which an effect's parameter counts as at its end
 POLISHED = 12  # steps of a fit that leaves something, before that counts
 
 
@@ -200,3 +201,17 @@ def polished(found: Fit) -> Fit:
     starts = [found.values, usual] if usual != found.values else [found.values]
     fits = each(lambda values: fit(found.data, values, z, POLISHED, rounds=3), starts)
     return min([found, *fits], key=lambda item: item.cost)
+
+
+def at_end(fit: Fit) -> tuple[str, ...]:
+    """Effects of a fit of which a parameter that is no shape lies at the end of what is believed of it."""
+    problem = Problem(fit.data, fit.values)
+    low, high = problem.bounds()
+    places = problem.place(fit.values, fit.z)
+    edge = END * (high - low)
+    far = (places <= low + edge) | (places >= high - edge)
+    return tuple(
+        item.effect
+        for item, yes in zip(problem.frees, far[fit.z.size :], strict=True)
+        if yes and not item.parameter.shape
+    )

@@ -21,6 +21,7 @@ USUAL_RATE = 0.05  # m/s, of a part whose motion was not recorded or is none
 FARTHEST = 4.0  # times a usual size where a search still begins
 LIMITS = (0.25, 0.4, 0.55, 0.7, 0.85, 0.95)  # of what is reached: where a limit is looked for
 SWALLOWED = (0.3, 1.0)  # of what is reached: a play that takes a large part of a small motion
+INSIDE = 0.5  # of the largest play: one inside which a part may rest, and which a fit may still move
 
 
 class Scales:
@@ -123,6 +124,19 @@ class Scales:
         if not parameter.swallows or not reached:
             return []
         return [min(share * reached, parameter.most) for share in SWALLOWED]
+
+    def resting(self, effect: Effect) -> Iterator[dict[str, float]]:
+        """Parameters of a play inside which a part rests, under laws whose shape says what moves it there."""
+        for parameter in effect.parameters:
+            reached = self.reached(self.signal(effect, parameter.unit), parameter.unit)
+            if not parameter.swallows or not reached:
+                continue
+            width = min(reached, INSIDE * parameter.most)
+            for place, law in enumerate(effect.laws):
+                for shape in effect.further if place and not law.model else ():
+                    if shape.name in law.shapes:
+                        under = effect.under(place, {parameter.name: width})
+                        yield from (under | {shape.name: size} for size in shape.sizes)
 
     def _plan(self, effect: Effect) -> Plan:
         """The plan as the role sees it whose laboratory has an effect's site."""

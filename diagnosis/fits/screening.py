@@ -16,6 +16,9 @@ from diagnosis.fits.threads import each
 from laboratories.effects.effect import Effect
 from models.registry import Array
 
+# Of a start whose size must stay as it is: about as much as a fit then moves its shape.
+UNSTRETCHED = (0.5, 1.5)
+
 
 @dataclass(frozen=True)
 class ScreenedEffect:
@@ -90,4 +93,14 @@ def look(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect]:
         gain, share, z = plane.gain((moved - fit.reduced).ravel(), scales.stretch(effect))
         if form not in best or gain > best[form].gain:
             best[form] = ScreenedEffect(effect, scales.stretched(effect, values, share), z, gain)
-    return list(best.values())
+    return [*best.values(), *at_rest(effect, plane, scales)]
+
+
+def at_rest(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect]:
+    """For an effect that is a play the most promising one of those inside which the part rests, as it is."""
+    fit, found = plane.fit, []
+    for values in scales.resting(effect):
+        moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: values}))
+        gain, _, z = plane.gain((moved - fit.reduced).ravel(), UNSTRETCHED)
+        found.append(ScreenedEffect(effect, values, z, gain))
+    return sorted(found, key=lambda item: -item.gain)[:1]

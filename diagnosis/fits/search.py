@@ -11,7 +11,7 @@ from diagnosis.fits.laws.coupled import coupled
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
-from diagnosis.fits.unexplained import leaves, model_error, remaining
+from diagnosis.fits.unexplained import MATERIAL, leaves, model_error, remaining
 
 MOST = 3  # effects of one part, the bias of a sensor aside: more of them can imitate any residual
 # Effects of one part that leave only noise, each of them needed for that; the share of what is left that each must
@@ -75,7 +75,8 @@ def searched(bare: Fit, scales: Scales) -> Search:
     if remaining(chosen) < worth.LOUD:  # what leaves more has not found its largest effects yet
         chosen = together(chosen, scales, beside if chosen is before else None)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
-    return plainest(likeliest(Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others)))))
+    found = Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others)))
+    return plainest(believed(likeliest(found)))
 
 
 def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, list[Fit], list[Fit] | None]:
@@ -85,8 +86,8 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
     effect, best first. As the noise follows from what is left, it may change with every effect.
     """
     chosen, better = bare, first
-    while better and worth.is_worth(bare, chosen, better[0]):
-        best = candidates.exchanged(better[0], scales) if len(better[0].names) > 1 else better[0]
+    while better and worth.is_worth(bare, chosen, best := trade.foremost(better)):
+        best = candidates.in_other_laws(candidates.exchanged(best, scales)) if len(best.names) > 1 else best
         chosen = settling.settled(best, bare.data)
         while count(chosen) < MOST and (more := settling.beside_colour(chosen, scales)):
             chosen = more
@@ -102,7 +103,7 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
 
 def count(fit: Fit) -> int:
     """How many effects of a fit can imitate something else."""
-    return sum(not fit.data.catalogue[name].constant for name in fit.names)
+    return sum(not fit.data.catalogue[name].motionless for name in fit.names)
 
 
 def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fit:
@@ -135,12 +136,17 @@ def needed(fit: Fit, most: float) -> Fit:
 
 
 def pruned(bare: Fit, fit: Fit) -> Fit:
-    """The fit without effects that explain too little."""
+    """The fit without effects that explain too little.
+
+    What no motion causes cannot repair the formula of what a motion does, so that beside coloured noise, of which it
+    explains little, it stays where that noise is far less likely without it.
+    """
     for name in fit.names:
         if len(fit.names) < 2:
             break
         less = candidates.without(fit, name)
-        if not worth.is_worth(bare, less, fit):
+        stays = fit.data.catalogue[name].motionless and settling.beats_colour(fit, less)
+        if not (stays or worth.is_worth(bare, less, fit)):
             fit = less
     return fit
 
@@ -176,8 +182,29 @@ def likeliest(search: Search) -> Search:
     best = min(same, key=lambda fit: fit.cost, default=chosen)
     if best.cost > chosen.cost - fitting.TIED or remaining(best) > remaining(chosen):
         return search
-    rest = [chosen, *(item for item in search.alternatives if item is not best)]
-    return replace(search, chosen=best, alternatives=tuple(rest))
+    return in_front(search, best)
+
+
+def believed(search: Search) -> Search:
+    """The search with effects inside their ranges in front of ones at the end of theirs, if none is seen to leave more.
+
+    At the end of its range an effect turns into another one, as pinching without stiffness at the origin into slip.
+    What tells the two then is the formula, which no laboratory follows exactly.
+    """
+    chosen = search.chosen
+    if not fitting.at_end(chosen):
+        return search
+    others = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
+    faint = [item for item in others if remaining(item) < MATERIAL and not fitting.at_end(item)]
+    return in_front(search, min(faint, key=lambda fit: fit.cost, default=chosen))
+
+
+def in_front(search: Search, stands: Fit) -> Search:
+    """The search with one of its alternatives as the chosen fit, and that among the alternatives."""
+    if stands is search.chosen:
+        return search
+    rest = [search.chosen, *(item for item in search.alternatives if item is not stands)]
+    return replace(search, chosen=stands, alternatives=tuple(rest))
 
 
 def plainest(search: Search) -> Search:
@@ -192,11 +219,7 @@ def plainest(search: Search) -> Search:
         return artefacts, trade.freedom(fit)[0], fit.cost
 
     same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
-    stands = min([chosen, *(item for item in same if tied(chosen, item))], key=order)
-    if stands is chosen:
-        return search
-    rest = [chosen, *(item for item in search.alternatives if item is not stands)]
-    return replace(search, chosen=stands, alternatives=tuple(rest))
+    return in_front(search, min([chosen, *(item for item in same if tied(chosen, item))], key=order))
 
 
 def exchanged_pair(chosen: Fit, other: Fit) -> tuple[str, str] | None:

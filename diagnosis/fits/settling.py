@@ -189,6 +189,11 @@ def beside_colour(fit: Fit, scales: Scales) -> Fit | None:
     return found[0] if found and not idle(found[0], changes(found[0])) else None
 
 
+def beats_colour(fit: Fit, less: Fit) -> bool:
+    """Whether a fit under coloured noise is far likelier than one without an effect, under the noise this leaves."""
+    return sensor_noise.coloured(fit.data) and far_likelier(fit, remodelled(less))
+
+
 def far_likelier_ones(bare: Fit, fits: list[Fit]) -> tuple[Fit, list[Fit]]:
     """The fit without effects, and fits with one, best first, under the noise that the best of these leaves.
 

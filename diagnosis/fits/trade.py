@@ -45,6 +45,11 @@ def freedom(fit: Fit) -> tuple[int, int]:
     return len(Problem(fit.data, fit.values).frees), len(fit.names)
 
 
+def foremost(fits: Sequence[Fit]) -> Fit:
+    """Of fits, best first, that the data cannot tell from the best the one with the fewest free parameters."""
+    return min((item for item in fits if tied(fits[0], item)), key=freedom)
+
+
 def traded(
     bare: Fit, chosen: Fit, first: list[Fit], scales: Scales, most: int
 ) -> tuple[Fit, tuple[Fit, ...]]:

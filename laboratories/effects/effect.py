@@ -106,7 +106,7 @@ class Effect:
     random: bool = False  # noise: a prediction without noise leaves it out
     contact: Contact | None = None  # an end stop: each impact depends on the ones before it
     shifts_time: bool = False  # moves a motion in time, so that a search starts at the shift by correlation
-    constant: bool = False  # adds a constant to a reading, which imitates no motion
+    motionless: bool = False  # adds to a reading what no motion causes, as a constant, and so imitates none
     timed: bool = False  # acts on rates, or delays, so that data whose times have no meaning cannot show it
     starts: Callable[[Plan], tuple[float, ...]] = (
         no_starts  # sizes for plans for which the parameter's own fail

@@ -48,7 +48,7 @@ class ReadingFault:
     reference: str  # a source or an equation
     in_samples: bool = False  # as in `Effect`
     random: bool = False  # as in `Effect`
-    constant: bool = False  # as in `Effect`
+    motionless: bool = False  # as in `Effect`
     timed: bool = False  # as in `Effect`
     # parameters of shape, by the field of `SensorEffects` that each sets
     shapes: Mapping[str, Parameter] = field(default_factory=dict)
@@ -70,7 +70,7 @@ class ReadingFault:
             in_samples=self.in_samples,
             random=self.random,
             timed=self.timed,
-            constant=self.constant,
+            motionless=self.motionless,
         )
 
 

@@ -11,7 +11,7 @@ import pytest
 from diagnosis.fits import candidates, fitting, residuals, unexplained, worth
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import Search, likeliest, search, together, trimmed
+from diagnosis.fits.search import Search, believed, likeliest, pruned, search, together, trimmed
 from laboratories.effects import CATALOGUE
 from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, lab_b, named, white
 from tests.diagnosis.test_equivalents import DATA, NOISY
@@ -24,6 +24,7 @@ ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth
     ("actuator.backlash", {"width": 2e-4}, {"width": 0.05}),
     ("actuator.backlash", {"width": 2e-4, "law": 1.0}, {"width": 0.05, "law": 0.0}),
     ("table.backlash", PLAYED, {"width": 0.05, "law": 0.0}),
+    ("table.backlash", {**PLAYED, "width": 6e-4}, {"law": 0.0}),  # the platform never reaches a flank
     (
         "actuator.backlash",
         {"width": 2e-4, "law": 2.0, "spring_back": 6e-3},
@@ -117,6 +118,29 @@ def test_two_effects_in_one_laboratory_are_both_found(cases: Cases) -> None:
     )
     assert named(report) == ["actuator.backlash", "column.yielding"]
     assert estimate(report, "actuator.backlash", "width") == pytest.approx(3e-4, rel=0.05)
+
+
+LEAKY: Effects = {
+    "actuator.deadband": {"width": 4e-4, "law": 1.0},
+    "column.stiffness": {"factor": 1.2},
+}
+
+
+def test_an_effect_that_was_found_first_changes_its_law_beside_a_second_one(cases: Cases) -> None:
+    report = cases.report(LEAKY)
+    assert report["status"] == "explained"
+    assert counts_as(report, "column.stiffness")
+    assert estimate(report, "actuator.deadband", "law") == 1.0
+    assert estimate(report, "actuator.deadband", "width") == pytest.approx(4e-4, rel=0.05)
+
+
+def test_effects_that_may_stand_for_another_are_looked_at_under_all_their_laws(cases: Cases) -> None:
+    whole = cases.record(LEAKY)
+    data, scales = residuals.prepare(lab_a(whole), whole), Scales(whole)
+    wrong = fitting.fit(data, {"actuator.backlash": {"width": 3e-4}, "column.stiffness": {"factor": 1.2}})
+    best = candidates.alternatives(wrong, [], scales)[0]
+    assert best.values["actuator.deadband"]["law"] == 1.0
+    assert fitting.excess(best) < 1e-3 * fitting.excess(wrong)
 
 
 @pytest.mark.parametrize("true", ["column.stiffness", "sensor.column_force.gain"])
@@ -291,6 +315,46 @@ def test_a_far_likelier_exchange_of_one_effect_stands_in_front(cases: Cases) -> 
     assert likeliest(known) is known
     more = replace(known, chosen=wrong, alternatives=(fitting.at(data, true.values | wrong.values, true.z),))
     assert likeliest(more) is more
+
+
+@pytest.mark.parametrize(("left", "first"), [(0.08, "damper.viscous"), (0.2, "damper.gain")])
+def test_effects_at_the_end_of_their_ranges_stand_behind_others_that_leave_nothing_to_see(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch, left: float, first: str
+) -> None:
+    found = cases.record({"damper.viscous": {"factor": 1.5}}, duration=8.0)
+    data = residuals.prepare(lab_b(found), found)
+    most = data.catalogue["damper.gain"].parameters[0].most
+    bare, end, other = (
+        fitting.at(data, values, np.zeros(len(data.part.nuisances)))
+        for values in ({}, {"damper.gain": {"factor": most}}, {"damper.viscous": {"factor": 1.4}})
+    )
+    monkeypatch.setattr("diagnosis.fits.search.remaining", lambda _: left)
+    assert believed(Search(data, bare, end, (other,))).chosen.names == (first,)
+    assert believed(Search(data, bare, other, (end,))).chosen is other
+
+
+@pytest.mark.parametrize(
+    ("name", "likely", "kept"),
+    [
+        ("sensor.damper_stroke.drift", True, True),
+        ("sensor.damper_stroke.drift", False, False),
+        ("damper.stiffness", True, False),
+    ],
+)
+def test_what_no_motion_causes_stays_where_coloured_noise_is_far_less_likely(
+    monkeypatch: pytest.MonkeyPatch, name: str, likely: bool, kept: bool
+) -> None:
+    bare, both = (
+        Fit(DATA, {key: {} for key in names}, np.zeros(0), NOISY) for names in ((), (name, "damper.friction"))
+    )
+
+    def without(fit: Fit, gone: str) -> Fit:
+        return replace(fit, values={key: values for key, values in fit.values.items() if key != gone})
+
+    monkeypatch.setattr(candidates, "without", without)
+    monkeypatch.setattr(worth, "is_worth", lambda _bare, less, _fit: "damper.friction" not in less.names)
+    monkeypatch.setattr("diagnosis.fits.settling.beats_colour", lambda *_: likely)
+    assert (name in pruned(bare, both).names) is kept
 
 
 def test_an_effect_is_found_that_shows_most_in_the_seconds_that_a_fit_sees(cases: Cases) -> None:

@@ -12,9 +12,9 @@ from diagnosis.diagnose import doubted, examine
 from diagnosis.findings import where
 from diagnosis.findings.certainty.trust import less_by_freedom, share_named
 from diagnosis.findings.report import status_of
-from diagnosis.findings.verdict import PartVerdict, allowed, artefact, at_end, farthest, judge, lone_noise
+from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge, lone_noise
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
-from diagnosis.fits.fitting import Fit
+from diagnosis.fits.fitting import Fit, at_end
 from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search

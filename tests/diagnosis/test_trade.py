@@ -9,7 +9,7 @@ import numpy as np
 from diagnosis.findings.which import described
 from diagnosis.fits.fitting import TIED, Fit
 from diagnosis.fits.laws import best
-from diagnosis.fits.trade import simplest, tied
+from diagnosis.fits.trade import foremost, simplest, tied
 from laboratories.effects import CATALOGUE
 from models.registry import Array
 from tests.diagnosis.test_equivalents import DATA, NOISY
@@ -33,6 +33,11 @@ def test_if_two_descriptions_predict_the_same_the_one_with_fewer_free_parameters
 def test_a_description_that_fits_better_is_chosen_whatever_its_number_of_parameters() -> None:
     one, two = fit(SIDED), fit(PAIR, 0.2)
     assert simplest([two, one]) == (one, ())
+
+
+def test_of_fits_that_the_data_cannot_tell_from_the_best_the_search_goes_on_with_the_simplest() -> None:
+    best, simple, worse = fit(SIDED), fit(PAIR, 1e-4), fit({"damper.friction": COULOMB}, 0.2)
+    assert foremost([best, simple, worse]) is simple
 
 
 def test_fits_with_equal_costs_and_different_residuals_are_not_tied() -> None:

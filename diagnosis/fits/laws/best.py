@@ -34,11 +34,12 @@ SLIGHT = (
 BETTER = 0.9  # of what is left beyond noise: less of it is worth another law than the first
 
 
-def in_best_laws(fits: list[Fit]) -> list[Fit]:
+def in_best_laws(fits: list[Fit], *, modelled: bool = True) -> list[Fit]:
     """The fits, best first, with the effect that came last under that law of its mechanism that leaves least.
 
     Nothing is tried where the best fit leaves nothing. The best one is first fitted to its end under its own law:
-    another law would else explain what that fit has not reached yet.
+    another law would else explain what that fit has not reached yet. Laws that are models of specimens, which take
+    long, are tried if `modelled`.
     """
     if not fits or whole(fits[0]):
         return fits
@@ -46,7 +47,7 @@ def in_best_laws(fits: list[Fit]) -> list[Fit]:
         fits = sorted([fitting.polished(fits[0]), *fits[1:]], key=cost)
         if whole(fits[0]):
             return fits
-    others = raced([item for item in fits if excess(item) <= FARTHEST * excess(fits[0])])
+    others = raced([item for item in fits if excess(item) <= FARTHEST * excess(fits[0])], modelled=modelled)
     better = sorted((others.get(item.names[-1], item) for item in fits), key=cost)
     return ending(better, fits)
 
@@ -65,14 +66,14 @@ def ending(better: list[Fit], fits: list[Fit]) -> list[Fit]:
     return better
 
 
-def raced(fits: list[Fit], most: float = math.inf) -> dict[str, Fit]:
+def raced(fits: list[Fit], most: float = math.inf, *, modelled: bool = True) -> dict[str, Fit]:
     """The fits whose last effect leaves less under another law than the first, by that effect.
 
     The laws of all effects are fitted for a few steps, and those that then lead to their end, unless they leave more
     than `most` or far more than the best of the fits.
     """
     firsts = {item.names[-1]: item for item in reversed(fits)}
-    starts = [start for item in firsts.values() for start in begun(item)]
+    starts = [start for item in firsts.values() for start in begun(item, modelled)]
     most = min(most, FARTHEST * min(map(excess, fits)))
     found: dict[str, list[Fit]] = {}
     rough = sorted(each(lambda start: fitted(start, ROUGH, 1), starts), key=cost)
@@ -103,15 +104,21 @@ def frees(fit: Fit) -> int:
     return len(Problem(fit.data, fit.values).frees)
 
 
-def begun(fit: Fit) -> list[Fit]:
+def begun(fit: Fit, modelled: bool) -> list[Fit]:
     """The fit with its last effect under further laws, where a fit of each starts best: those with the best starts."""
-    way = path(fit.data.part)
-    models = sorted({law.model for law in last(fit).laws[1:] if law.model}) if way is not None else []
+    way = path(fit.data.part) if modelled else None
+    models = sorted(models_of(last(fit))) if way is not None else []
     known = follow(fit.data.part, way, models) if way is not None else {}
     followed = {model: item.parameters for model, item in known.items()}
-    tried = [law.model not in SLOW or law.model in known for law in last(fit).laws]
+    slow = SLOW if modelled else models_of(last(fit))
+    tried = [law.model not in slow or law.model in known for law in last(fit).laws]
     places = [place for place, wanted in enumerate(tried) if place and wanted]
     return sorted((begun_under(fit, place, followed) for place in places), key=cost)[:FITTED]
+
+
+def models_of(effect: Effect) -> set[str]:
+    """The models of specimens that further laws of an effect are."""
+    return {law.model for law in effect.laws[1:] if law.model}
 
 
 def begun_under(fit: Fit, place: int, followed: Mapping[str, Mapping[str, float]]) -> Fit:

@@ -23,5 +23,5 @@ FAULT = ReadingFault(
     ),
     says="the reading is off by a constant",
     reference="reading = value + offset",
-    constant=True,
+    motionless=True,
 )

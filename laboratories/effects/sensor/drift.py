@@ -23,4 +23,5 @@ FAULT = ReadingFault(
     ),
     says="the error of the reading grows steadily",
     reference="reading = value + rate·t",
+    motionless=True,
 )
