@@ -13,7 +13,7 @@ import numpy as np
 from diagnosis.fits import contact, fitting
 from diagnosis.fits.fitting import TIED, Fit, everywhere, excess
 from diagnosis.fits.hypothesis import Values
-from diagnosis.fits.laws.best import in_best_laws
+from diagnosis.fits.laws.best import descended, in_best_laws, raced
 from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import ScreenedEffect, screen
@@ -134,8 +134,10 @@ def in_other_laws(fit: Fit) -> Fit:
     for name in fit.names[:-1]:
         if len(fit.data.catalogue[name].laws) > 1 and leaves(fit):
             rest = {key: values for key, values in fit.values.items() if key != name}
-            (better,) = in_best_laws([replace(fit, values=rest | {name: fit.values[name]})], modelled=False)
-            fit = replace(better, values={key: better.values[key] for key in fit.names})
+            better = raced([replace(fit, values=rest | {name: fit.values[name]})], modelled=False)
+            if name in better:
+                found = descended(better[name])
+                fit = replace(found, values={key: found.values[key] for key in fit.names})
     return fit
 
 
@@ -145,7 +147,8 @@ def alternatives(fit: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, ...]:
         return tuple(item for item in first if item.names != fit.names)
     result: list[Fit] = []
     for name in fit.names:
-        others = extended(without(fit, name), scales, known=fit)
-        others = in_best_laws(others, modelled=False) if leaves(fit) else others
-        result += [other for other in others if set(other.names) != set(fit.names)]
+        others = [item for item in extended(without(fit, name), scales, known=fit) if name not in item.names]
+        if others and leaves(fit) and excess(others[0]) < HOPELESS * excess(fit):
+            others[:1] = in_best_laws(others[:1], modelled=False)
+        result += others
     return tuple(sorted(result, key=lambda item: item.cost))
