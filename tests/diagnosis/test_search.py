@@ -31,6 +31,7 @@ ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth
         {"width": 0.05, "spring_back": 0.1},
     ),
     ("actuator.deadband", {"width": 4e-4, "law": 1.0}, {"width": 0.05, "law": 0.0}),
+    ("actuator.compliance", {"compliance": 1.5e-8, "law": 1.0}, {"compliance": 0.05, "law": 0.0}),
     ("actuator.delay", {"delay": 6e-3}, {"delay": 0.1}),  # the plan's own delay is known to 0.28 ms only
     ("column.friction", {"force": 900.0}, {"force": 0.05}),
     ("column.yielding", {"yield_displacement": 1.2e-3, "hardening": 0.1}, {"yield_displacement": 0.05}),
