@@ -28,6 +28,7 @@ from diagnosis.findings.certainty.trust import SIGNS, Weights
 from models.registry import Array
 from report.text import terminal
 from validation.blind.results.calibration import brier, expected_calibration_error
+from validation.blind.results.stated import is_true
 
 # Whether a larger sign makes a verdict more (1) or less (-1) probable.
 SENSES = {"clear": 1.0, "names": -1.0}
@@ -38,6 +39,7 @@ PENALTIES = (
     10.0,
     30.0,
 )  # half a decade apart: the likelihood changes little between two of them
+JUDGED = ("kind", "truth", "asked", "listed", "surplus")  # what `is_true` takes
 FOLDS = 10  # the usual number: each model learns from nine tenths of the cases
 FEWEST = 20  # verdicts from which on weights are learned: below it a fold has hardly one that is wrong
 
@@ -46,7 +48,7 @@ class Verdicts(NamedTuple):
     """Verdicts that name something, one row each."""
 
     signs: Array  # (verdicts, signs)
-    right: Array  # (verdicts,) 1 where every true effect is named
+    right: Array  # (verdicts,) 1 where it is true
     stated: Array  # (verdicts,) probability in the report
     kinds: tuple[str, ...]
 
@@ -67,9 +69,7 @@ def verdicts(cases: Sequence[dict[str, Any]], *, partly: bool) -> Verdicts:
     ]
     return Verdicts(
         np.array([[item["signs"][name] for name in SIGNS] for item in rows]).reshape(len(rows), len(SIGNS)),
-        np.array(
-            [float(item["named"] and bool(item["truth"]) and item["kind"] != "unknown") for item in rows]
-        ),
+        np.array([float(is_true(*(item[name] for name in JUDGED))) for item in rows]),
         np.array([item["probability"] for item in rows]),
         tuple(item["kind"] for item in rows),
     )

@@ -24,8 +24,10 @@ def case(status: str = "explained", **changed: Any) -> dict[str, Any]:
         "status": status,
         "signs": dict.fromkeys(SIGNS, 1.0),
         "probability": 0.9,
-        "named": True,
         "truth": ["column.friction"],
+        "asked": 1,
+        "listed": 1,
+        "surplus": 0,
         "kind": "catalogue",
     } | changed
 
@@ -58,8 +60,10 @@ def test_only_verdicts_that_name_something_are_learned_from_and_partly_ones_apar
         case(),
         case(signs={}),
         case(kind="unknown"),
-        case("partly_explained", named=False),
+        case("partly_explained", listed=0),
         case(probability=None),
+        case(surplus=1),
+        case(truth=["column.friction", "damper.friction"]),  # of which one is too small to be found
     ]
-    assert learn.verdicts(cases, partly=False).right.tolist() == [1.0, 0.0]
+    assert learn.verdicts(cases, partly=False).right.tolist() == [1.0, 0.0, 0.0, 1.0]
     assert learn.verdicts(cases, partly=True).right.tolist() == [0.0]

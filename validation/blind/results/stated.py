@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Sized
 
 import numpy as np
 
@@ -14,10 +14,15 @@ from validation.blind.results.scoring import Outcome
 Stated = tuple[float, bool]  # probability, and whether it was true
 
 
+def is_true(kind: str, truth: Sized, asked: int, listed: int, surplus: int) -> bool:
+    """Whether a verdict is true: it names every effect that is large enough to be found, and none that is not there."""
+    return len(truth) > 0 and kind != "unknown" and listed == asked and surplus == 0
+
+
 def stated_verdicts(outcomes: Iterable[Outcome]) -> list[Stated]:
     """Probability and truth of every verdict that names something."""
     return [
-        (item.probability, item.named and bool(item.truth) and item.kind != "unknown")
+        (item.probability, is_true(item.kind, item.truth, item.asked, item.listed, item.surplus))
         for item in outcomes
         if item.verdict and math.isfinite(item.probability)
     ]
