@@ -17,6 +17,8 @@ class ActuatorEffects:
     """Effects on an actuator, beyond the plan's model."""
 
     velocity_limit: float = math.inf  # m/s
+    velocity_limit_sharpness: float = math.inf  # with which the speed bends at its limit
+    stall_force: float = math.inf  # N, load at which the piston stands
     backlash: float = 0.0  # m, whole play
     backlash_law: float = (
         0.0  # 0 behind the loop, between piston and specimen, 1 before the loop, 2 behind, greased

@@ -21,6 +21,7 @@ from laboratories.column.specimen import REACTION, Specimen
 from models import preisach
 from models.compiled import jit
 from models.registry import Array
+from models.saturation import saturated
 from models.system import ActuatorEffects, ColumnEffects
 from models.transfer_systems import delay, first_order, servo_hydraulic
 
@@ -40,7 +41,7 @@ SERVO, DISPLACEMENT, FORCE, PLAYED, LOOSE, STATES = range(6)
 PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, HYDRAULIC, BEYOND, BEFORE = (
     range(11)
 )
-SPRING_BACK, LEAKING, LOAD = range(11, 14)  # LOAD: compliance within the loop
+SPRING_BACK, LEAKING, LOAD, SHARPNESS, STALL = range(11, 16)  # LOAD: compliance within the loop
 WITHIN_LOOP = 1.0  # law of `actuator.compliance`: the load takes from the error of the loop
 # laws of `actuator.backlash`: the play between command and loop, and greased play behind the loop
 BEFORE_LOOP, GREASED = 1.0, 2.0
@@ -70,7 +71,8 @@ def build(
     """The laboratory at rest, with the system's parameters and effects.
 
     Raises:
-        InputError: parameters of the specimen are not valid, or servo-hydraulics are given backlash or no mass.
+        InputError: parameters of the specimen are not valid, or servo-hydraulics are given backlash, a gradual limit
+            of the velocity or no mass.
     """
     on_actuator, on_column = actuator_effects or ActuatorEffects(), column_effects or ColumnEffects()
     if actuator.model == "servo_hydraulic":
@@ -91,7 +93,7 @@ def build(
         segments.taps,
         rows,
         segments.lengths,
-        np.array([*limits, 0.0, 0.0, before, *formulas(on_actuator), within]),
+        np.array([*limits, 0.0, 0.0, before, *formulas(on_actuator), within, *valve(on_actuator)]),
         np.zeros(segments.memory),
         np.zeros(STATES),
         specimen.build(column, on_column),
@@ -112,6 +114,11 @@ def compliances(effects: ActuatorEffects) -> tuple[float, float]:
     if effects.compliance_law == WITHIN_LOOP:
         return 0.0, effects.compliance
     return effects.compliance, 0.0
+
+
+def valve(effects: ActuatorEffects) -> tuple[float, float]:
+    """The sharpness with which the speed bends at its limit, and the load (N) at which the piston stands."""
+    return effects.velocity_limit_sharpness, effects.stall_force
 
 
 def formulas(effects: ActuatorEffects) -> tuple[float, float]:
@@ -138,6 +145,11 @@ def hydraulic(
             "The actuator 'servo_hydraulic' cannot have the effect 'actuator.backlash', because its piston carries the "
             "specimen's mass: leave it out, or choose 'fopdt'."
         )
+    if math.isfinite(on_actuator.velocity_limit_sharpness):
+        raise InputError(
+            "The actuator 'servo_hydraulic' cannot have the effect 'actuator.velocity_limit' with law 1, because its "
+            "valve has a dynamics of its own: give law 0 or 2, or choose 'fopdt'."
+        )
     bare = replace(column, mass=0.0, damping=0.0)
     on_column = replace(on_column, viscous=0.0, inertia=0.0)
     behind, within = compliances(on_actuator)
@@ -149,7 +161,7 @@ def hydraulic(
     segments = delay.split(interval, servo.delay, steps, held=held)
     limits = [float(limited), on_actuator.velocity_limit * servo.piston, 0.0, behind]
     limits += [on_actuator.deadband, servo.gain, column.stiffness, float(held), 1.0, float(beyond), 0.0]
-    limits += [*formulas(on_actuator), within]
+    limits += [*formulas(on_actuator), within, *valve(on_actuator)]
     return ColumnLab(
         segments.taps,
         servo_hydraulic.propagators(a, b, segments.lengths),
@@ -225,7 +237,7 @@ def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
                     ahead = under_load(rows[i], limits, ahead, servo, cell[REACTION])
                     pull = cell[REACTION] + 0.5 * limits[STIFFNESS] * (ahead - servo)
                     middle -= limits[LOAD] * pull / limits[GAIN]
-                servo += limited(limits, ahead - servo, middle, servo, lengths[i])
+                servo += limited(limits, ahead - servo, middle, servo, cell[REACTION], lengths[i])
                 displacement = loaded(limits, state, servo, displacement, cell[REACTION], lengths[i])
             else:
                 servo = ahead
@@ -272,7 +284,8 @@ def choked(limits: Array, state: Array) -> None:
     """Limit the flow of a servo-hydraulic valve to its largest value."""
     if limits[PRESENT] == 0.0:
         return
-    flow, most = state[STATES + servo_hydraulic.FLOW], limits[VELOCITY_LIMIT]
+    flow = state[STATES + servo_hydraulic.FLOW]
+    most = limits[VELOCITY_LIMIT] * pressure(limits, flow, state[STATES + servo_hydraulic.FORCE])
     if abs(flow) > most:
         state[STATES + servo_hydraulic.FLOW] = most if flow > 0.0 else -most
         state[STATES + servo_hydraulic.FLOW_RATE] = 0.0
@@ -290,13 +303,22 @@ def under_load(row: Array, limits: Array, ahead: float, servo: float, reaction: 
 
 
 @jit
-def limited(limits: Array, way: float, command: float, servo: float, length: float) -> float:
+def pressure(limits: Array, way: float, load: float) -> float:
+    """Share of the highest speed that the load (N) leaves a valve in the direction of `way`: √(1 − f/stall)."""
+    against = load if way > 0.0 else -load
+    return math.sqrt(max(1.0 - against / limits[STALL], 0.0))
+
+
+@jit
+def limited(limits: Array, way: float, command: float, servo: float, load: float, length: float) -> float:
     """Displacement of the piston (m) within a segment of `length` s, from that of a valve without overlap or limit."""
     error = limits[GAIN] * command - servo
     if limits[DEADBAND] > 0.0:
         way *= (error - blocked(limits, error)) / error if error != 0.0 else 0.0
-    longest = limits[VELOCITY_LIMIT] * length
-    return min(max(way, -longest), longest)
+    if math.isinf(limits[VELOCITY_LIMIT]):
+        return way
+    longest = limits[VELOCITY_LIMIT] * length * pressure(limits, way, load)
+    return saturated(way, longest, limits[SHARPNESS])
 
 
 @jit

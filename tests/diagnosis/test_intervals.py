@@ -27,7 +27,7 @@ from diagnosis.fits.hypothesis import Problem
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
 from models.registry import Array
-from tests.diagnosis.cases import Cases, lab_b
+from tests.diagnosis.cases import Cases, lab_a, lab_b
 
 BLOCKS, EACH = 12, 50  # blocks of 1 s, of so many samples
 
@@ -126,6 +126,15 @@ def test_a_level_that_a_reading_does_not_go_beyond_is_as_wide_as_formulas_differ
     assert between_formulas(fit, free) == pytest.approx(np.log(limit / tanh), rel=0.1)
     clipped = fitting.at(data, {name: {"limit": 20.0, "sharpness": 3.0}}, fit.z)
     assert between_formulas(clipped, free) == 0.0
+
+
+def test_a_limit_at_which_a_machine_bends_is_as_wide_as_formulas_differ(cases: Cases) -> None:
+    name = "actuator.velocity_limit"
+    data = residuals.prepare(lab_a(cases.record()), cases.record())
+    for values, wide in (({"sharpness": 3.0, "law": 1.0}, np.log(1.5) / 3.0), ({}, 0.0)):
+        fit = fitting.at(data, {name: {"velocity": 0.01, **values}}, np.zeros(len(data.part.nuisances)))
+        (free,) = (one for one in Problem(data, fit.values).frees if one.parameter.name == "velocity")
+        assert between_formulas(fit, free) == pytest.approx(wide)
 
 
 def test_the_interval_of_an_unreached_level_holds_that_of_another_formula(cases: Cases) -> None:

@@ -160,21 +160,23 @@ def between_solutions(fit: Fit) -> float:
 
 
 def between_formulas(fit: Fit, item: Free) -> float:
-    """How far, as a fit moves it, another formula may put a level that the signal did not go beyond; 0 for others.
+    """How far, as a fit moves it, another formula may put a level at which a signal bends; 0 for all else.
 
-    By value/(1 + |value/L|ⁿ)^(1/n) a reading is smaller by |value/L|ⁿ/n near zero, by L'·tanh(|value/L'|ᵐ)^(1/m) by
+    A reading that goes beyond its level shows it; what bends within a machine is not read. By
+    value/(1 + |value/L|ⁿ)^(1/n) a signal is smaller by |value/L|ⁿ/n near zero, by L'·tanh(|value/L'|ᵐ)^(1/m) by
     |value/L'|²ᵐ/(3m). These agree for m = n/2 and L' = L/1.5^(1/n).
     """
     given = fit.values[item.effect]
     effect = fit.data.catalogue[item.effect]
-    if not item.parameter.bends_by or effect.signal not in fit.data.part.signals:
+    if item.parameter.bends_by not in given:
         return 0.0
-    others = {name: values for name, values in fit.values.items() if name != item.effect}
-    free = fit.data.part.predict(hypothesis.lay(fit.data, fit.z, others))
-    peak = float(np.nanmax(np.abs(free[:, fit.data.part.signals.index(effect.signal)])))
-    return (
-        math.log(1.5) / given[item.parameter.bends_by] if peak < BEYOND * given[item.parameter.name] else 0.0
-    )
+    if effect.signal:
+        others = {name: values for name, values in fit.values.items() if name != item.effect}
+        free = fit.data.part.predict(hypothesis.lay(fit.data, fit.z, others))
+        peak = float(np.nanmax(np.abs(free[:, fit.data.part.signals.index(effect.signal)])))
+        if peak >= BEYOND * given[item.parameter.name]:
+            return 0.0
+    return math.log(1.5) / given[item.parameter.bends_by]
 
 
 def moved_by(chosen: Fit, other: Fit, item: Free) -> float | None:

@@ -61,8 +61,10 @@ def shapes(fit: Fit, effect: Effect, place: int, finer: tuple[float, ...] = FINE
     if shape is None:
         return [{}]
     way = path(fit.data.part)
-    if shape in effect.further and way is not None:
+    if shape in effect.further and way is not None and shape.unit == "m":
         sizes = {share * float(np.max(np.abs(way[0]))) for share in REACHED}
+    elif shape in effect.further and way is not None and shape.unit == "N":
+        sizes = {float(np.max(np.abs(way[1]))) / share for share in REACHED}
     else:
         sizes = {share * size for share in (*finer, 1.0) for size in shape.sizes}
     lengths = [item for item in effect.further if item.name in law.shapes and item.unit == shape.unit == "m"]

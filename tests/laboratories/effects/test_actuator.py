@@ -47,6 +47,30 @@ def test_the_servo_loop_solves_its_equation_with_limit_dead_band_and_load(
     assert np.max(np.abs(got - exact)) < 2e-3 * np.max(np.abs(exact))
 
 
+@pytest.mark.parametrize(("sharpness", "stall"), [(2.0, math.inf), (math.inf, 4e4)], ids=["gradual", "load"])
+def test_the_servo_loop_solves_its_equation_with_a_valve_that_saturates(
+    sharpness: float, stall: float
+) -> None:
+    actuator, most = Actuator(delay=0.0133, time_constant=0.030), 0.03
+    command = tones(400, size=1.5e-3)
+    more = ActuatorEffects(velocity_limit=most, velocity_limit_sharpness=sharpness, stall_force=stall)
+    got = run_a(command, actuator, actuator_effects=more)[:, 0]
+    reached = ramped(command, 0.0133)
+
+    def slope(t: float, y: Array) -> Any:
+        free = (reached(t) - y) / 0.030
+        if math.isfinite(sharpness):
+            return free / (1.0 + np.abs(free / most) ** sharpness) ** (1.0 / sharpness)
+        highest = most * np.sqrt(np.maximum(1.0 - np.sign(free) * K * y / stall, 0.0))
+        return np.clip(free, -highest, highest)
+
+    times = DT * np.arange(1, command.size + 1)
+    exact = solve_ivp(slope, (0, times[-1]), [0.0], t_eval=times, max_step=DT / 8, rtol=1e-8, atol=1e-12).y[0]
+    sudden = run_a(command, actuator, actuator_effects=ActuatorEffects(velocity_limit=most))[:, 0]
+    assert np.max(np.abs(sudden - exact)) > 3e-5  # there is something to be seen
+    assert np.max(np.abs(got - exact)) < 3e-3 * np.max(np.abs(exact))
+
+
 def test_the_velocity_limit_is_the_slope_of_a_large_step() -> None:
     got = run_a(np.full(200, 0.01), actuator_effects=ActuatorEffects(velocity_limit=0.03))[:, 0]
     slopes = np.diff(got) / DT

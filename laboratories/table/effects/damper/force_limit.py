@@ -28,6 +28,7 @@ EFFECT = sets(
             sizes=(62.0, 50.0, 35.0, 20.0),
             says="largest magnitude",
             follows="damper_command",
+            bends_by="sharpness",
         ),
     },
     further={
