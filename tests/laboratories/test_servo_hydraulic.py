@@ -199,6 +199,20 @@ def test_the_flow_saturates_at_the_fully_open_valve() -> None:
     assert np.abs(bound[1000:, 0]).max() == pytest.approx(limit / (4.0 * 5.0), rel=0.15)  # of a triangle
 
 
+def test_the_flow_of_the_open_valve_falls_with_the_load() -> None:
+    limit, stall = 0.05, 8e3
+    more = ActuatorEffects(velocity_limit=limit, stall_force=stall)
+    lab = column_lab.build(DT, servo(), COLUMN, more)
+    at_limit = 0
+    for value in 5e-3 * np.sin(2.0 * np.pi * 5.0 * np.arange(2000) * DT):
+        column_lab.advance(lab, float(value))
+        flow, force = lab.state[[column_lab.STATES + servo_hydraulic.FLOW, column_lab.FORCE]]
+        most = limit * SERVO.piston * math.sqrt(1.0 - math.copysign(1.0, flow) * force / stall)
+        at_limit += abs(flow) == pytest.approx(most, rel=1e-12)
+        assert abs(flow) < (1.0 + 1e-12) * most
+    assert at_limit > 200
+
+
 def test_a_command_within_the_overlap_moves_nothing_and_a_larger_one_falls_short() -> None:
     overlap = ActuatorEffects(deadband=2e-4)
     small = run(column_lab.build(DT, servo(), COLUMN, overlap), np.full(2000, 0.9e-4 / SERVO.gain))
@@ -240,6 +254,9 @@ def test_effects_that_servo_hydraulics_cannot_have_are_refused(
         lay(System(plan), [entry])
     with pytest.raises(InputError, match="cannot have the effect 'actuator.backlash'"):
         column_lab.build(DT, servo(), COLUMN, ActuatorEffects(backlash=1e-4))
+    gradual = ActuatorEffects(velocity_limit=0.05, velocity_limit_sharpness=3.0)
+    with pytest.raises(InputError, match=r"'actuator.velocity_limit' with law 1"):
+        column_lab.build(DT, servo(), COLUMN, gradual)
     with pytest.raises(InputError, match="above 0 kg"):
         column_lab.build(DT, servo(), Column())
 
