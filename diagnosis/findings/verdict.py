@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.findings.sites.likely import APART, ranked
+from diagnosis.findings.sensors.slow_noise import heard_as_noise, lone_noise, moves
+from diagnosis.findings.sites.likely import APART, REST, ranked
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit, at_end
 from diagnosis.fits.hypothesis import TOLERANCES
@@ -34,17 +35,9 @@ MOST_LEFT = 0.2  # of a gap's rms that effects may leave as an error of such sol
 # Share of a gap's rms that may be taken for coloured noise where only the residual itself is evidence: a sixth of its
 # energy.
 OWN = 0.4
-# Noise of a reading at its loudest frequency over that at the highest ones, from which on it is doubted where no other
-# reading of its laboratory has more than QUIET, or all others have so many times less. Pink noise of a test has less
-# than LONE.
-LONE, QUIET = 10.0, 2.0
 AGAIN = 6  # steps of a fit under another noise, from where it was
 # Standard deviations of Σ z² above its mean from which on the nominal parameters speak against the effects beside them.
 STRAINED = 3.0
-# A stand-in rarely explains more than 0.94 of a gap's energy, the true mechanism under another law rarely less: on the
-# set "tune" and on effects of no catalogue stand-ins explained 0.59 to 0.93 of it where no nominal parameter was at its
-# bound, true mechanisms 0.95 to 1.00.
-REST = 0.06
 # Share of a gap's energy beyond any that these stand-ins explained.
 NEARLY = 0.99
 # Stand-ins per true name among the verdicts that leave nothing: 5 of 78 were wrong (docs/reference/blind.md).
@@ -154,22 +147,6 @@ def unnamed(search: Search) -> PartVerdict:
     )
 
 
-def heard_as_noise(search: Search) -> tuple[Search, str]:
-    """A search without effects, under less noise where coloured noise of readings may hide an unknown effect.
-
-    That is white noise, or for a lone reading the noise that all readings have. With it goes the reading of which that
-    is doubtful, empty where none is: noise that several readings have as they would follow from one motion is that
-    motion.
-    """
-    name = lone_noise(search.chosen)
-    if not name and np.max(sensor_noise.loudest(search.chosen), initial=0.0) < LONE:
-        return search, ""
-    white = in_white_noise(search)
-    if moves(white.chosen):
-        return white, ""
-    return (in_common_noise(search), name) if name else (search, "")
-
-
 def shaken(verdict: PartVerdict, usual: Mapping[str, float]) -> PartVerdict | None:
     """The verdict where what looks like loud noise of readings follows from a machine's motion, else None.
 
@@ -190,31 +167,6 @@ def shaken(verdict: PartVerdict, usual: Mapping[str, float]) -> PartVerdict | No
     )
 
 
-def moves(fit: Fit) -> bool:
-    """Whether the readings follow from a machine's unknown motion so well that no sensor's error explains as much."""
-    found = ranked(fit)
-    near = [item.site for item in found if item.cost < APART]
-    return bool(near) and not any("sensor." in site for site in near) and found[0].left < REST
-
-
-def lone_noise(fit: Fit) -> str:
-    """The only reading with loud slow noise of which nothing but its motion tells, empty where there is none.
-
-    A logger treats its channels alike, and what a machine with a resonance does by an unknown effect looks like this.
-    Where the machine is not at rest the effect is there as well, in the part that moves least too. Noise that is no
-    louder than the plan says is that of the sensor.
-    """
-    loud = sensor_noise.loudest(fit)
-    if loud.size < 2 or any(item.source == "at rest" for item in fit.data.noise):
-        return ""
-    place, (second, first) = int(np.argmax(loud)), np.sort(loud)[-2:]
-    if first < LONE or (second > QUIET and first < LONE * second):
-        return ""
-    planned = fit.data.planned
-    expected = planned is not None and fit.data.noise[place].rms <= planned[place]
-    return "" if expected else fit.data.part.signals[place]
-
-
 def beside_lone_noise(search: Search) -> tuple[Search, str]:
     """A search with effects under noise that all readings have, where a lone one with loud slow noise hides a gap.
 
@@ -229,18 +181,6 @@ def beside_lone_noise(search: Search) -> tuple[Search, str]:
     others.sort(key=lambda fit: fit.cost)
     common = likeliest(Search(data, bare, chosen, tuple(others)))
     return (search, "") if how_well(common) == "explained" else (common, name)
-
-
-def in_common_noise(search: Search) -> Search:
-    """A search without effects under noise of the colour that all readings have."""
-    bare = fitting.fit(sensor_noise.in_common(search.chosen), {}, search.chosen.z)
-    return replace(search, data=bare.data, commissioned=bare, chosen=bare)
-
-
-def in_white_noise(search: Search) -> Search:
-    """A search without effects under white noise of the level of the highest frequencies."""
-    bare = fitting.fit(sensor_noise.whitened(search.chosen), {}, search.chosen.z)
-    return replace(search, data=bare.data, commissioned=bare, chosen=bare)
 
 
 def without_effects(search: Search) -> Outcome:

@@ -27,7 +27,7 @@ MOSTLY = (
 )
 # Share of what a fit leaves, beyond noise, that must lie on either side of what it sees: with less a fit finds nothing,
 # or nothing judges it.
-ONE_SIDED = 0.01
+ONE_SIDED = 0.1
 NEAR = 1.0  # tolerances within which fits begin: a parameter that is further away imitates an effect
 LOST = 100.0  # mean square residual in σ² from which on fitted nominal parameters mean nothing
 # Times what a rival leaves, beyond which a fit comes no nearer by further steps or at the bottom of its valley: these

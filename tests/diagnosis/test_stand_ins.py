@@ -12,7 +12,8 @@ from diagnosis.diagnose import doubted, examine
 from diagnosis.findings import where
 from diagnosis.findings.certainty.trust import less_by_freedom, share_named
 from diagnosis.findings.report import status_of
-from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge, lone_noise
+from diagnosis.findings.sensors.slow_noise import lone_noise
+from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
 from diagnosis.fits.fitting import Fit, at_end
 from diagnosis.fits.hypothesis import TOLERANCES
@@ -169,6 +170,9 @@ def test_slow_noise_that_the_plan_states_is_no_unknown_effect(cases: Cases) -> N
     labs = tuple(replace(lab, plan=plan) for lab in whole.labs)
     for record, name in ((whole, "damper_stroke"), (replace(whole, labs=labs), "")):
         assert lone_noise(bare_fit(wandering(record, "damper_stroke", wander=WANDER))) == name
+    fit = bare_fit(wandering(whole, "damper_stroke", wander=WANDER))
+    louder = replace(fit.data, planned=fit.data.white / 5.0)  # as all readings are
+    assert lone_noise(replace(fit, data=louder)) == ""
 
 
 def test_loud_slow_noise_of_a_single_reading_beside_an_effect_may_be_an_unknown_one(cases: Cases) -> None:

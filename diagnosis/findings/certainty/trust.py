@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import REST, PartVerdict
+from diagnosis.findings.sites.likely import REST
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import worth
 from diagnosis.fits.laws.best import BETTER
 from diagnosis.fits.trade import freedom

@@ -1,0 +1,82 @@
+"""Slow noise of readings, which may be a machine's unknown effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.findings.sensors.readings import LEAST
+from diagnosis.findings.sites.likely import APART, REST, ranked
+from diagnosis.fits import fitting, sensor_noise
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.search import Search
+
+# Noise of a reading at its loudest frequency over that at the highest ones, from which on it is doubted where no other
+# reading of its laboratory has more than QUIET, or all others have so many times less. Pink noise of a test has less
+# than LONE.
+LONE, QUIET = 10.0, 2.0
+
+
+def heard_as_noise(search: Search) -> tuple[Search, str]:
+    """A search without effects, under less noise where coloured noise of readings may hide an unknown effect.
+
+    That is white noise, or for a lone reading the noise that all readings have. With it goes the reading of which that
+    is doubtful, empty where none is: noise that several readings have as they would follow from one motion is that
+    motion.
+    """
+    name = lone_noise(search.chosen)
+    if not name and np.max(sensor_noise.loudest(search.chosen), initial=0.0) < LONE:
+        return search, ""
+    white = in_white_noise(search)
+    if moves(white.chosen):
+        return white, ""
+    return (in_common_noise(search), name) if name else (search, "")
+
+
+def moves(fit: Fit) -> bool:
+    """Whether the readings follow from a machine's unknown motion so well that no sensor's error explains as much."""
+    found = ranked(fit)
+    near = [item.site for item in found if item.cost < APART]
+    return bool(near) and not any("sensor." in site for site in near) and found[0].left < REST
+
+
+def lone_noise(fit: Fit) -> str:
+    """The only reading with loud slow noise of which nothing but its motion tells, empty where there is none.
+
+    A logger treats its channels alike, and what a machine with a resonance does by an unknown effect looks like this.
+    Where the machine is not at rest the effect is there as well, in the part that moves least too. Noise that the plan
+    makes expected is that of the sensor.
+    """
+    loud = sensor_noise.loudest(fit)
+    if loud.size < 2 or any(item.source == "at rest" for item in fit.data.noise):
+        return ""
+    place, (second, first) = int(np.argmax(loud)), np.sort(loud)[-2:]
+    if first < LONE or (second > QUIET and first < LONE * second):
+        return ""
+    return "" if expected(fit, place) else fit.data.part.signals[place]
+
+
+def expected(fit: Fit, place: int) -> bool:
+    """Whether the noise of a reading is no louder than the plan says, or than it is on the other readings over plan.
+
+    A plan rarely knows a sensor's noise better than within a factor of two.
+    """
+    planned = fit.data.planned
+    if planned is None or not planned[place] > 0.0:
+        return False
+    over = fit.data.white[planned > 0.0] / planned[planned > 0.0]
+    own = fit.data.white[place] / planned[place]
+    return bool(own <= max(LEAST, float(np.median(over))))
+
+
+def in_common_noise(search: Search) -> Search:
+    """A search without effects under noise of the colour that all readings have."""
+    bare = fitting.fit(sensor_noise.in_common(search.chosen), {}, search.chosen.z)
+    return replace(search, data=bare.data, commissioned=bare, chosen=bare)
+
+
+def in_white_noise(search: Search) -> Search:
+    """A search without effects under white noise of the level of the highest frequencies."""
+    bare = fitting.fit(sensor_noise.whitened(search.chosen), {}, search.chosen.z)
+    return replace(search, data=bare.data, commissioned=bare, chosen=bare)
