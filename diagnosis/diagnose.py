@@ -37,6 +37,7 @@ from models.system import System
 
 # s. A shorter recording is not judged: it holds less than one period of the default building's first mode (2 Hz).
 SHORTEST = 0.5
+WITHOUT_GAP = ("none", "tolerances")
 UNNAMED = ("partly", "unknown")  # outcomes of a part in which some of the gap has no named cause
 # Ratio of the noise in a balance of forces to that of the forces used, from which on a logger caused it.
 # A wrong mass gives a smaller ratio.
@@ -194,7 +195,19 @@ def judged(data: Data, scales: Scales, view: Data | None = None) -> PartVerdict:
         verdict = judge(search(data, scales))
         if view is None or verdict.outcome not in UNNAMED:
             return verdict
-    return judge(search(view, scales))
+    verdict = judge(search(view, scales))
+    return verdict if verdict.outcome in WITHOUT_GAP else still(view, scales) or verdict
+
+
+def still(view: Data, scales: Scales) -> PartVerdict | None:
+    """The verdict on a building's balance over longer averages where these show no gap, else None.
+
+    What its parameters or forces do shows over these as well; noise that only the controller read does not.
+    """
+    part = view.part
+    longer = residuals.over_longer(view, part) if isinstance(part, LoggedBuilding) else None
+    verdict = None if longer is None else judge(search(longer, scales))
+    return verdict if verdict and verdict.outcome in WITHOUT_GAP else None
 
 
 def own_noise(data: Data) -> bool:

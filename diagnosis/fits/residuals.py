@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from common.errors import InputError
+from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.parts import EXACT, MODEL_ERROR, Part
 from diagnosis.recorded.record import Record
 from diagnosis.signals import colour
@@ -27,6 +28,8 @@ from models.registry import Array
 from models.system import System
 
 AVERAGED = 0.008  # s, over which residuals are averaged: the laboratories move much more slowly
+PER_PERIOD = 12  # long averages in the shortest period of a building whose forces a logger recorded
+FEWEST = 250  # of these that a recording must have: noise of a colour is known from no fewer
 BLOCK = 1.0  # s, of the blocks that are held out in turn: longer than a model's error is correlated
 HELD_OUT = (2, 4)  # of every five blocks, these
 STEPPING = 2.0  # steps over the noise from which on a reading is rounded to more than its noise
@@ -187,14 +190,41 @@ def prepare(part: Part, record: Record, steps: Mapping[str, float] | None = None
     return measured_by(data, 0.0 * ones if part.exact else noise(data.residual(system)))
 
 
-def withheld(ticks: int, interval: float) -> tuple[int, Mask]:
-    """How many ticks are averaged, and which of the averaged samples (groups,) fits may see: blocks in turn."""
-    group = max(1, round(AVERAGED / interval))
+def withheld(ticks: int, interval: float, times: int = 1) -> tuple[int, Mask]:
+    """How many ticks are averaged, and which of the averaged samples (groups,) fits may see: blocks in turn.
+
+    So many `times` more ticks are averaged than of most parts.
+    """
+    group, block = usual(interval)
     groups = ticks // group
-    block = max(1, round(BLOCK / (interval * group)))
     if groups < 5 * block:
         return group, np.arange(groups) % 5 < min(HELD_OUT)
-    return group, ~np.isin((np.arange(groups) // block) % 5, HELD_OUT)
+    train = ~np.isin((np.arange(groups) // block) % 5, HELD_OUT)
+    return group * times, train[::times][: groups // times]
+
+
+def usual(interval: float) -> tuple[int, int]:
+    """How many ticks are averaged of most parts, and how many averaged samples a block has."""
+    group = max(1, round(AVERAGED / interval))
+    return group, max(1, round(BLOCK / (interval * group)))
+
+
+def over_longer(data: Data, building: LoggedBuilding) -> Data | None:
+    """The residuals of a building averaged over a twelfth of its shortest period, None where that is no longer.
+
+    Its acceleration holds noise that the controller read and the log does not show. The shorter the averages, the more
+    of it looks like another mass and stiffness. A block keeps a whole number of averages.
+    """
+    interval = data.system.plan.test.interval
+    group, block = usual(interval)
+    longest = min(
+        building.shortest / (PER_PERIOD * group * interval), len(building.measured) / (group * FEWEST)
+    )
+    times = max((one for one in range(1, block + 1) if block % one == 0 and one <= longest), default=1)
+    if times == 1:
+        return None
+    wider, train = withheld(len(building.measured), interval, times)
+    return replace(data, group=wider, train=train)
 
 
 def withheld_ticks(ticks: int, interval: float) -> Mask:

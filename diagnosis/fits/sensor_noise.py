@@ -41,9 +41,9 @@ WHITE = 3.0
 SLOWER = (1, 4, 16)  # averaged samples in the sums by which that is decided
 # Motion elsewhere over that of the quiet part, from which on noise that is as loud in both does not follow it.
 VARIED = 2.0
-LEAST = 500  # averaged samples without which no flexible model is asked
 # Noise at its loudest frequency over that at the highest ones, up to which it counts as white beside coloured noise.
 FLAT = 2.0
+LEAST = 4.0  # s of a recording without which no flexible model is asked
 LOWER = 0.9  # of the noise first found, from which on a lower one is believed
 
 
@@ -149,10 +149,10 @@ def mains(fit: Fit) -> Array | None:
 def related(data: Data, system: System) -> Crosswise | None:
     """A flexible model of averaged residuals from the part's inputs, None where too little was recorded for one."""
     columns = [data.averaged(values) for values in inputs(data.part, system).T]
-    if not columns or data.groups < LEAST:
+    interval = data.system.plan.test.interval * data.group
+    if not columns or data.groups * interval < LEAST:
         return None
     everywhere = np.ones(data.groups, dtype=bool)
-    interval = data.system.plan.test.interval * data.group
     return Crosswise(features(np.column_stack(columns), interval, everywhere, timeless=True))
 
 

@@ -46,6 +46,11 @@ class LoggedBuilding(Building):
         logger = tuple(LoggedForce(name, by, None, self._force, at) for name, by, at in rows if self._force)
         self.nuisances = (*of.nuisances, *logger)
 
+    @property
+    def shortest(self) -> float:
+        """The shortest natural period of the planned building, s."""
+        return float(np.min(shear_building.modes(*partition.matrices(self._plan)).periods))
+
     def balance(self, system: System, motion: Array) -> Array:
         """M·ẍ + C·ẋ + K·x of the numerical part, (ticks, storeys) N, for displacement, velocity and acceleration."""
         M, C, K = partition.numerical(system.plan)

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from diagnosis.diagnose import own_noise
+from diagnosis.diagnose import judged, own_noise, still
 from diagnosis.findings import gaps, how_far, report, verdict
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import residuals
+from diagnosis.fits.residuals import over_longer
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
 from diagnosis.recorded import logged_building
@@ -165,3 +166,25 @@ def test_the_response_shows_effects_that_change_it_by_more_than_noise(
     named = Diagnosis(cast(Record, None), verdicts=[verdict.judge(drifting)])
     assert how_far.hardly_shown(named, far, changed) is hidden
     assert not how_far.hardly_shown(Diagnosis(cast(Record, None)), far, changed)
+
+
+def test_noise_that_only_the_controller_read_is_no_fault_of_the_building(cases: Cases) -> None:
+    whole = cases.record()
+    data = logged(whole)
+    longer = over_longer(data, cast(LoggedBuilding, data.part))
+    assert longer is not None
+    assert longer.group == 5 * data.group  # 40 ms, a twelfth of a period of 0.5 s
+    ticks = residuals.withheld_ticks(whole.ticks, whole.plan.test.interval)
+    assert np.array_equal(np.repeat(~longer.train, longer.group), ticks[: longer.groups * longer.group])
+    short = logged(cases.record(duration=4.0))
+    assert over_longer(short, cast(LoggedBuilding, short.part)) is None  # too few averages
+    noise = 5e-3 * white(6, whole.ticks)  # m/s², in the acceleration that the master computed from it
+    unread = relogged(whole, "acceleration", whole.signals["acceleration"] + noise)
+    unread = relogged(
+        unread, "column_force", unread.signals["column_force"] + 0.5 * LEVEL * white(9, whole.ticks)
+    )
+    view, scales = logged(unread), Scales(unread)
+    assert verdict.judge(search(view, scales)).outcome == "unknown"
+    assert judged(residuals.prepare(Building(unread), unread), scales, view).outcome == "none"
+    heavier = cases.record({"structure.mass": {"factor": 1.1}})
+    assert still(logged(heavier), scales) is None
