@@ -25,9 +25,9 @@ SHORTEST, LONGEST = 6.0, 0.7  # of a beginning: seconds, and share of the test
 MOSTLY = (
     0.7  # share of what a fit leaves that a beginning must hold, so that the rest of the test teaches little
 )
-# Share of what a fit leaves, beyond noise, that must lie on either side of what it sees: with less a fit finds nothing,
-# or nothing judges it.
-ONE_SIDED = 0.1
+# Share of what a fit leaves, beyond noise, that must lie on either side of what it sees: with less a fit finds little,
+# or little judges it; and the share with which it finds nothing, or nothing judges it.
+ONE_SIDED, NOTHING = 0.1, 0.01
 NEAR = 1.0  # tolerances within which fits begin: a parameter that is further away imitates an effect
 LOST = 100.0  # mean square residual in σ² from which on fitted nominal parameters mean nothing
 # Times what a rival leaves, beyond which a fit comes no nearer by further steps or at the bottom of its valley: these
@@ -123,14 +123,15 @@ def excess(fit: Fit) -> float:
     return max(0.0, fit.chi - fit.data.size) + fit.prior
 
 
-def one_sided(fit: Fit) -> bool:
-    """Whether what a fit leaves lies nearly all in the groups that it has seen, or nearly all in those that judge.
+def one_sided(fit: Fit, least: float = ONE_SIDED) -> bool:
+    """Whether of what a fit leaves less than a share lies in the groups that it has seen, or in those that judge.
 
     An effect that acts in a second or two only cannot be found in one half of the time and judged in the other.
     """
     extra = np.sum(np.square(fit.reduced), axis=1) - fit.data.size / fit.data.groups
     seen, judging = float(extra[fit.data.train].sum()), float(extra[fit.data.judging].sum())
-    return not fit.data.train.all() and min(seen, judging) < ONE_SIDED * max(seen, judging)
+    larger = max(seen, judging)
+    return not fit.data.train.all() and larger > 0.0 and min(seen, judging) < least * larger
 
 
 def near(fit: Fit, rival: Fit) -> bool:

@@ -52,7 +52,7 @@ def search(data: Data, scales: Scales) -> Search:
         return searched(settling.settled(fitting.fit(data.whole, {})), scales)
     found = searched(bare, scales)
     left = found.chosen
-    if left.names and leaves(left, model_error(left)) and fitting.one_sided(left):
+    if left.names and leaves(left, model_error(left)) and fitting.one_sided(left, fitting.NOTHING):
         return searched(settling.settled(fitting.fit(data.whole, {})), scales)
     return found
 

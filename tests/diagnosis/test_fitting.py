@@ -248,7 +248,9 @@ def test_sensors_read_a_motion_that_is_kept_as_they_read_one_that_is_played(
     assert not np.array_equal(kept.reduced, fitting.at(data, effects, z).reduced)
 
 
-@pytest.mark.parametrize(("seen", "judging", "one"), [(4.0, 0.0, True), (0.0, 4.0, True), (4.0, 4.0, False)])
+@pytest.mark.parametrize(
+    ("seen", "judging", "one"), [(4.0, 0.0, True), (0.0, 4.0, True), (4.0, 4.0, False), (-0.2, -0.1, False)]
+)
 def test_a_gap_on_one_side_of_what_a_fit_sees_is_told(
     cases: Cases, seen: float, judging: float, one: bool
 ) -> None:
