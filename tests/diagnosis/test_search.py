@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.fits import candidates, fitting, residuals, unexplained, worth
+from diagnosis.fits import search as searching
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, believed, likeliest, pruned, search, together, trimmed
@@ -65,6 +66,33 @@ def test_an_effect_that_acts_in_one_second_only_is_found_with_no_second_withheld
     assert estimate(report, "actuator.velocity_limit", "velocity") == pytest.approx(0.025, rel=0.01)
     assert report["how_far"]["judged_on"] == "same seconds"
     assert report["how_far"]["closed"] > 0.9
+
+
+def test_a_valve_whose_speed_falls_with_the_load_is_found(cases: Cases) -> None:
+    name = "actuator.velocity_limit"
+    report = cases.report({name: {"velocity": 0.02, "law": 2.0, "stall": 5e4}})
+    assert (report["status"], named(report)) == ("explained", [name])
+    assert estimate(report, name, "law") == 2.0
+    assert estimate(report, name, "stall") == pytest.approx(5e4, rel=0.02)
+
+
+@pytest.mark.parametrize("sides", [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)])
+def test_what_effects_leave_on_one_side_is_searched_with_nothing_withheld(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch, sides: tuple[float, float]
+) -> None:
+    whole = cases.record()
+    data, seen = residuals.prepare(lab_a(whole), whole), []
+    left = fitting.at(data, {"column.friction": {"force": 900.0}}, np.zeros(len(data.part.nuisances)))
+    far = np.where(data.train, *sides)[:, None] * 9.0 + 1.0
+    left = replace(left, reduced=far * np.ones(data.sigma.size))
+
+    def searched(bare: Fit, _scales: Scales) -> Search:
+        seen.append(bool(bare.data.train.all()))
+        return Search(bare.data, bare, left, ())
+
+    monkeypatch.setattr(searching, "searched", searched)
+    search(data, Scales(whole))
+    assert seen == ([False] if sides == (1.0, 1.0) else [False, True])
 
 
 STOP: Effects = {"damper.stroke_stop": {"stroke": 0.04, "stiffness": 2000.0}}
