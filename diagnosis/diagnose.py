@@ -37,7 +37,7 @@ from models.system import System
 
 # s. A shorter recording is not judged: it holds less than one period of the default building's first mode (2 Hz).
 SHORTEST = 0.5
-WITHOUT_GAP = ("none", "tolerances")
+WITHOUT_GAP = ("none", "tolerances")  # outcomes of a part that leave nothing to explain
 UNNAMED = ("partly", "unknown")  # outcomes of a part in which some of the gap has no named cause
 # Ratio of the noise in a balance of forces to that of the forces used, from which on a logger caused it.
 # A wrong mass gives a smaller ratio.

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.findings.sensors.common_noise import in_common
 from diagnosis.findings.sensors.slow_noise import heard_as_noise, lone_noise, moves
 from diagnosis.findings.sites.likely import APART, REST, ranked
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
@@ -175,7 +176,7 @@ def beside_lone_noise(search: Search) -> tuple[Search, str]:
     name = lone_noise(search.chosen)
     if not name:
         return search, ""
-    data = sensor_noise.in_common(search.chosen)
+    data = in_common(search.chosen)
     fits = (search.commissioned, search.chosen, *search.alternatives)
     bare, chosen, *others = each(lambda fit: fitting.fit(data, fit.values, fit.z, AGAIN, rounds=1), fits)
     others.sort(key=lambda fit: fit.cost)

@@ -41,8 +41,6 @@ WHITE = 3.0
 SLOWER = (1, 4, 16)  # averaged samples in the sums by which that is decided
 # Motion elsewhere over that of the quiet part, from which on noise that is as loud in both does not follow it.
 VARIED = 2.0
-# Noise at its loudest frequency over that at the highest ones, up to which it counts as white beside coloured noise.
-FLAT = 2.0
 LEAST = 4.0  # s of a recording without which no flexible model is asked
 LOWER = 0.9  # of the noise first found, from which on a lower one is believed
 
@@ -179,30 +177,6 @@ def whitened(fit: Fit) -> Data:
     return residuals.measured_by(
         data, residuals.noise(data.residual(hypothesis.lay(data, fit.z, fit.values)))
     )
-
-
-def in_common(fit: Fit) -> Data:
-    """The data of a fit with noise of the colour that all readings have, each at its level of the highest frequencies.
-
-    A logger treats its channels alike, so that what one of them has beyond that colour need not be noise. It is white
-    unless most readings have coloured noise; a white one among these hides the colour behind the steps of a converter.
-    """
-    white, models = whitened(fit), remodelled(fit).noise
-    if not coloured(fit.data):  # a level known from elsewhere stays
-        white = residuals.measured_by(white, np.minimum(white.white, fit.data.white))
-    pairs = [(item, level) for item, level in zip(models, white.white, strict=True) if level > 0.0]
-    shapes = [(item, level) for item, level in pairs if loudness(item, level) > FLAT]
-    if 2 * len(shapes) <= len(pairs):
-        return white
-    shape = np.min([item.density / level**2 for item, level in shapes if item.density is not None], axis=0)
-    rms = min(item.rms / level for item, level in shapes)
-    noise = tuple(
-        replace(item, rms=float(rms * level), density=level**2 * shape)
-        if loudness(item, level) > FLAT
-        else item
-        for item, level in zip(models, white.white, strict=True)
-    )
-    return residuals.measured_by(replace(white, noise=noise), np.array([item.rms for item in noise]))
 
 
 def share(data: Data) -> float:

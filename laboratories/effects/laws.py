@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -107,6 +108,13 @@ def added(system: System, *, table: str, key: str, **given: float) -> System:
 def which_law(most: float, says: str) -> Parameter:
     """The parameter `law`, by which an effect with laws 0 to `most` chooses its formula; `says` names them."""
     return Parameter("law", "", null=0.0, least=0.0, most=most, sizes=(), says=says, shape=True)
+
+
+def bend_sharpness(says: str) -> Parameter:
+    """The shape `sharpness` n of a limit L that a machine reaches gradually, by x/(1 + |x/L|ⁿ)^(1/n); inf: suddenly."""
+    return Parameter(
+        "sharpness", "", null=math.inf, least=1.0, most=20.0, sizes=(1.5, 3.0), says=says, shape=True
+    )
 
 
 def extra_time(name: str, sizes: tuple[float, ...]) -> Parameter:

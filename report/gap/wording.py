@@ -29,7 +29,7 @@ STATUS = {
 QUIET = ("no_gap", "within_tolerances")  # statuses that leave nothing to explain
 JUDGED = {
     "interleaved (interpolation)": "On seconds between those used for fitting",
-    "same seconds": "On the seconds used for fitting, as the gap shows in few",
+    "same seconds": "On the seconds used for fitting (too few show the gap to withhold any)",
     "other recordings": "On the recordings given for validation",
     "held-out time windows": "On data not used for fitting",
     "recordings given": "On the recordings given for validation",

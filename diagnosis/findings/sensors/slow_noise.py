@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.findings.sensors.common_noise import in_common
 from diagnosis.findings.sensors.readings import LEAST
 from diagnosis.findings.sites.likely import APART, REST, ranked
 from diagnosis.fits import fitting, sensor_noise
@@ -58,9 +59,9 @@ def lone_noise(fit: Fit) -> str:
 
 
 def expected(fit: Fit, place: int) -> bool:
-    """Whether the noise of a reading is no louder than the plan says, or than it is on the other readings over plan.
+    """Whether the noise of a reading, over what the plan says of it, is no louder than on half of all readings.
 
-    A plan rarely knows a sensor's noise better than within a factor of two.
+    It may be twice as loud anyway, because a plan rarely knows a sensor's noise better than within a factor of two.
     """
     planned = fit.data.planned
     if planned is None or not planned[place] > 0.0:
@@ -72,7 +73,7 @@ def expected(fit: Fit, place: int) -> bool:
 
 def in_common_noise(search: Search) -> Search:
     """A search without effects under noise of the colour that all readings have."""
-    bare = fitting.fit(sensor_noise.in_common(search.chosen), {}, search.chosen.z)
+    bare = fitting.fit(in_common(search.chosen), {}, search.chosen.z)
     return replace(search, data=bare.data, commissioned=bare, chosen=bare)
 
 

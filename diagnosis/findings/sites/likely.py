@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.findings.sensors.common_noise import in_common
 from diagnosis.findings.sites.signatures import Signature, Spectrum, laboratory_of, signatures
 from diagnosis.fits import fitting, hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
@@ -68,7 +69,7 @@ def ranked(fit: Fit) -> list[LikelySite]:
     if part is None:
         return []
     if not sensor_noise.coloured(fit.data):
-        fit = fitting.at(sensor_noise.in_common(fit), fit.values, fit.z)
+        fit = fitting.at(in_common(fit), fit.values, fit.z)
     given = spectra(fit)
     system = hypothesis.lay(fit.data, fit.z, fit.values)
     found = [judged(given, item) for item in signatures(part, system, given.frequencies)]

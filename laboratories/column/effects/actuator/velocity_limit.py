@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 
 from laboratories.effects.effect import Law, Parameter
-from laboratories.effects.laws import sets, which_law
+from laboratories.effects.laws import bend_sharpness, sets, which_law
 
 EFFECT = sets(
     "actuator",
@@ -37,16 +37,7 @@ EFFECT = sets(
     },
     further={
         "": which_law(2.0, "0 suddenly, 1 gradually, 2 at a speed that falls with the load"),
-        "velocity_limit_sharpness": Parameter(
-            "sharpness",
-            "",
-            null=math.inf,
-            least=1.0,
-            most=20.0,
-            sizes=(1.5, 3.0),
-            says="how suddenly the speed bends at its limit under law 1",
-            shape=True,
-        ),
+        "velocity_limit_sharpness": bend_sharpness("how suddenly the speed bends at its limit under law 1"),
         "stall_force": Parameter(
             "stall",
             "N",

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from laboratories.effects.effect import Law, Parameter
-from laboratories.effects.laws import sets, which_law
+from laboratories.effects.laws import bend_sharpness, sets, which_law
 
 EFFECT = sets(
     "damper",
@@ -33,15 +33,8 @@ EFFECT = sets(
     },
     further={
         "": which_law(1.0, "0 suddenly, 1 gradually"),
-        "force_limit_sharpness": Parameter(
-            "sharpness",
-            "",
-            null=math.inf,
-            least=1.0,
-            most=20.0,
-            sizes=(1.5, 3.0),
-            says="how suddenly the motor's force bends at the limit under law 1",
-            shape=True,
+        "force_limit_sharpness": bend_sharpness(
+            "how suddenly the motor's force bends at the limit under law 1"
         ),
     },
     laws=(Law("sudden", {}), Law("gradual", {"sharpness": 3.0})),
