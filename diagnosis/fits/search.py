@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from diagnosis.fits import candidates, fitting, hypothesis, settling, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.laws.coupled import coupled
@@ -136,12 +138,14 @@ def needed(fit: Fit, most: float) -> Fit:
 
 
 def pruned(bare: Fit, fit: Fit) -> Fit:
-    """The fit without effects that explain too little.
+    """The fit without effects that explain too little, those of the least influence first.
 
-    What no motion causes cannot repair the formula of what a motion does, so that beside coloured noise, of which it
-    explains little, it stays where that noise is far less likely without it.
+    Beside one that changes nothing, an effect that explains a whole gap would be worth nothing either. What no motion
+    causes cannot repair the formula of what a motion does, so that beside coloured noise, of which it explains little,
+    it stays where that noise is far less likely without it.
     """
-    for name in fit.names:
+    sizes = map(np.max, worth.changes(fit))
+    for _, name in sorted(zip(sizes, fit.names, strict=True)):
         if len(fit.names) < 2:
             break
         less = candidates.without(fit, name)

@@ -381,9 +381,25 @@ def test_what_no_motion_causes_stays_where_coloured_noise_is_far_less_likely(
         return replace(fit, values={key: values for key, values in fit.values.items() if key != gone})
 
     monkeypatch.setattr(candidates, "without", without)
+    monkeypatch.setattr(worth, "changes", lambda fit: [np.ones(2)] * len(fit.names))
     monkeypatch.setattr(worth, "is_worth", lambda _bare, less, _fit: "damper.friction" not in less.names)
     monkeypatch.setattr("diagnosis.fits.settling.beats_colour", lambda *_: likely)
     assert (name in pruned(bare, both).names) is kept
+
+
+def test_an_effect_that_changes_nothing_goes_before_the_one_that_explains_the_gap(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    names = "damper.stiffness", "sensor.table_acceleration.bias"
+    both = Fit(DATA, {name: {} for name in names}, np.zeros(0), NOISY)
+
+    def without(fit: Fit, gone: str) -> Fit:
+        return replace(fit, values={key: values for key, values in fit.values.items() if key != gone})
+
+    monkeypatch.setattr(candidates, "without", without)
+    monkeypatch.setattr(worth, "changes", lambda fit: [np.full(2, 1e6), np.full(2, 1e-3)][: len(fit.names)])
+    monkeypatch.setattr("diagnosis.fits.settling.beats_colour", lambda *_: False)
+    assert pruned(replace(both, values={}), both).names == names[:1]
 
 
 def test_an_effect_is_found_that_shows_most_in_the_seconds_that_a_fit_sees(cases: Cases) -> None:
