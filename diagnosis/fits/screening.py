@@ -18,6 +18,9 @@ from models.registry import Array
 
 # Of a start whose size must stay as it is: about as much as a fit then moves its shape.
 UNSTRETCHED = (0.5, 1.5)
+# Times that a start at the end of its stretch is moved there and looked at again; of all that a fit costs, what it must
+# promise for that.
+FARTHER, MUCH = 3, 0.02
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,10 @@ class ScreenedEffect:
 
 
 class Plane:
-    """A fit's residuals as a linear function of its parameters, the nominal ones inside their bounds."""
+    """A fit's residuals as a linear function of its parameters, the nominal ones inside their bounds.
+
+    `alone` is what the fit costs at best without any further effect.
+    """
 
     def __init__(self, fit: Fit) -> None:
         self.fit = fit
@@ -45,7 +51,7 @@ class Plane:
         room[:count] = hypothesis.TOLERANCES + 1e-6
         at = np.concatenate([fit.z, np.zeros(size - count)])
         self._low, self._high = -room - at, room - at
-        self._alone = self._cost(np.zeros(size), 0.0, 0.0, (0.0, 1e-12))[0] if size else float(fit.cost)
+        self.alone = self._cost(np.zeros(size), 0.0, 0.0, (0.0, 1e-12))[0] if size else float(fit.cost)
 
     def gain(self, change: Array, stretch: tuple[float, float]) -> tuple[float, float, Array]:
         """What residuals that move by a share of `change` (groups·signals,) gain at best, that share, and z there."""
@@ -56,7 +62,7 @@ class Plane:
             return -math.inf, 0.0, self.fit.z
         along = float(outside @ self._off) / size if size > 0.0 else 0.0
         cost, share, moves = self._cost(inside, size, along, stretch)
-        return self._alone - cost, share, np.clip(self.fit.z + moves, -NEAR, NEAR)
+        return self.alone - cost, share, np.clip(self.fit.z + moves, -NEAR, NEAR)
 
     def _cost(
         self, inside: Array, size: float, along: float, stretch: tuple[float, float]
@@ -84,16 +90,39 @@ def screen(fit: Fit, effects: Iterable[Effect], scales: Scales) -> list[Screened
 
 def look(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect]:
     """For every form of an effect the size with the largest expected gain; effects already laid are left out."""
-    fit = plane.fit
-    if effect.name in fit.names:
+    if effect.name in plane.fit.names:
         return []
-    best: dict[tuple[float, ...], ScreenedEffect] = {}
+    best: dict[tuple[float, ...], tuple[ScreenedEffect, bool]] = {}
     for form, values in scales.starts(effect):
-        moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: values}))
-        gain, share, z = plane.gain((moved - fit.reduced).ravel(), scales.stretch(effect))
-        if form not in best or gain > best[form].gain:
-            best[form] = ScreenedEffect(effect, scales.stretched(effect, values, share), z, gain)
-    return [*best.values(), *at_rest(effect, plane, scales)]
+        found = look_from(effect, values, plane, scales)
+        if form not in best or found[0].gain > best[form][0].gain:
+            best[form] = found
+    kept = [look_farther(*found, plane, scales) for found in best.values()]
+    return [*kept, *at_rest(effect, plane, scales)]
+
+
+def look_from(
+    effect: Effect, values: dict[str, float], plane: Plane, scales: Scales
+) -> tuple[ScreenedEffect, bool]:
+    """The size along the line through a start that promises most, and whether it is as far as a start is stretched."""
+    fit, (least, most) = plane.fit, scales.stretch(effect)
+    moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: values}))
+    gain, share, z = plane.gain((moved - fit.reduced).ravel(), (least, most))
+    at_end = share in (least, most) and share not in (0.0, *UNSTRETCHED)
+    return ScreenedEffect(effect, scales.stretched(effect, values, share), z, gain), at_end
+
+
+def look_farther(item: ScreenedEffect, at_end: bool, plane: Plane, scales: Scales) -> ScreenedEffect:
+    """The effect at a larger size where it promises much, and more the farther it goes.
+
+    A force that stands still, as an offset, may be many times what a reading of forces shows of the motion.
+    """
+    for _ in range(FARTHER):
+        if not at_end or item.gain < MUCH * plane.alone:
+            break
+        further, at_end = look_from(item.effect, item.values, plane, scales)
+        item = max(item, further, key=lambda one: one.gain)
+    return item
 
 
 def at_rest(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect]:

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnosis.fits import candidates, fitting, residuals, unexplained, worth
+from diagnosis.fits import candidates, fitting, residuals, screening, unexplained, worth
 from diagnosis.fits import search as searching
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.scales import Scales
@@ -400,6 +400,13 @@ def test_an_effect_that_changes_nothing_goes_before_the_one_that_explains_the_ga
     monkeypatch.setattr(worth, "changes", lambda fit: [np.full(2, 1e6), np.full(2, 1e-3)][: len(fit.names)])
     monkeypatch.setattr("diagnosis.fits.settling.beats_colour", lambda *_: False)
     assert pruned(replace(both, values={}), both).names == names[:1]
+
+
+def test_a_force_that_stands_still_is_looked_for_far_beyond_what_the_motion_makes(cases: Cases) -> None:
+    whole = cases.record({"damper.offset": {"force": -2.0}}, scale=2e-4, duration=4.0)
+    bare = fitting.fit(residuals.prepare(lab_b(whole), whole), {})
+    (found,) = screening.screen(bare, [CATALOGUE["damper.offset"]], Scales(whole))
+    assert found.values["force"] == pytest.approx(-2.0, rel=0.1)
 
 
 def test_an_effect_is_found_that_shows_most_in_the_seconds_that_a_fit_sees(cases: Cases) -> None:
