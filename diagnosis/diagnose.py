@@ -211,7 +211,12 @@ def still(view: Data, scales: Scales) -> PartVerdict | None:
 
 
 def own_noise(data: Data) -> bool:
-    """Whether the balance of a building's forces has noise that its motion, and so the forces used, did not have."""
+    """Whether the balance of a building's forces has noise that its motion, and so the forces used, did not have.
+
+    Forces that lie behind a filter or delay of the logger are not those used, whatever their noise.
+    """
+    if isinstance(data.part, LoggedBuilding) and data.part.behind:
+        return True
     used = residuals.noise(data.part.measured)
     least = SMOOTH * np.sqrt(np.mean(np.square(data.part.measured), axis=0))
     return bool(np.any(data.white > np.maximum(OTHERS * used, least)))

@@ -62,12 +62,37 @@ class LoggerFilter:
         s = 2j * math.pi * np.asarray(frequency)
         return np.asarray(np.polyval(above, s) / np.polyval(below, s), dtype=np.complex128)
 
-    def filtered(self, values: Samples, interval: float) -> Samples:
-        """A signal (ticks,) after the filter, linear between ticks and constant at its first value before them."""
+    @cached_property
+    def modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """Poles p (1/s) with no negative imaginary part and weights w (1/s): the real part of Σ w/(s − p)."""
         from scipy import signal
 
-        above, below, _ = signal.cont2discrete(self.transfer, interval, method="foh")
-        return np.asarray(signal.lfilter(above[0], below, values - values[0]) + values[0])
+        omega = 2.0 * math.pi * self.cutoff
+        if self.type == "bessel":
+            _, poles, gain = signal.bessel(self.order, omega, analog=True, output="zpk", norm="mag")
+        else:
+            _, poles, gain = signal.butter(self.order, omega, analog=True, output="zpk")
+        apart = poles[:, None] - poles[None, :] + np.eye(poles.size)
+        weights = gain / np.prod(apart, axis=1)
+        upper = poles.imag >= 0.0
+        return poles[upper], np.where(poles.imag > 0.0, 2.0, 1.0)[upper] * weights[upper]
+
+    def filtered(self, values: Samples, interval: float) -> Samples:
+        """A signal (ticks,) after the filter, linear between ticks and constant at its first value before them.
+
+        Pole by pole, because the coefficients of a high order lose all digits where the cutoff is far below the rate.
+        """
+        from scipy import signal
+
+        moved = values - values[0]
+        result = np.full(values.size, values[0], dtype=np.float64)
+        for pole, weight in zip(*self.modes, strict=True):
+            step = pole * interval
+            kept = np.exp(step)
+            ramp = weight / (pole * step)
+            now, before = ramp * (np.expm1(step) - step), ramp * (1.0 + kept * (step - 1.0))
+            result += signal.lfilter([now, before], [1.0, -kept], moved).real
+        return result
 
 
 @dataclass(frozen=True)

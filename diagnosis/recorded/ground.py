@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from common.recording.imported import NOTHING_STATED
+from common.recording.imported import ImportedData
 from common.roles import MASTER
 from diagnosis.recorded.nuisances import Nuisance
 from diagnosis.recorded.parts import Measured, of_sites
@@ -25,30 +25,29 @@ class Ground(Measured):
     signals: tuple[str, ...] = ("ground_acceleration",)
 
     def __init__(self, record: Record, believed: Array) -> None:
-        self._believed = believed[:, : record.ticks]
         self._interval = record.plan.test.interval
+        stated = record.stated or ImportedData("")
+        rows = stated.channel(MASTER, self.signals[0])
+        self._believed = rows.through(believed[0, : record.ticks], self._interval)
         self._scale = record.plan.ground_motion.scale
         self.measured = record.signals["ground_acceleration"][:, None]
         self.present = record.present["ground_acceleration"][:, None]
         self.nuisances: tuple[Nuisance, ...] = ()
         self.candidates = of_sites(record, ("ground",), record.plan)
-        stated = record.stated
-        rows = stated.channel(MASTER, self.signals[0]) if stated else NOTHING_STATED
         self.blur = self.interpolated(rows.rate) if rows.interpolated and rows.rate > 0.0 else 0.0
 
     def interpolated(self, rate: float) -> float:
         """Rms error (m/s²) of the plan's motion once it is sampled at `rate` (Hz) and interpolated onto the ticks."""
-        ticks = np.arange(self._believed.shape[1]) * self._interval
+        ticks = np.arange(self._believed.size) * self._interval
         rows = np.arange(math.ceil(ticks[-1] * rate) + 1) / rate
-        motion = self._believed[0]
-        again = np.interp(ticks, rows, np.interp(rows, ticks, motion))
-        return float(np.sqrt(np.mean(np.square(again - motion))))
+        again = np.interp(ticks, rows, np.interp(rows, ticks, self._believed))
+        return float(np.sqrt(np.mean(np.square(again - self._believed))))
 
     def predict(self, system: System) -> Array:
         """Ground acceleration."""
         factor = system.plan.ground_motion.scale / self._scale if self._scale else 1.0
-        rows = substructure.shifted(self._believed, system.effects.time_shift / self._interval)
-        return factor * rows[0][:, None]
+        shift = system.effects.time_shift / self._interval
+        return factor * substructure.shifted(self._believed[None], shift).T
 
     def first(self, ticks: int) -> Ground:
         """The whole of it, because it is computed and cheap."""
@@ -58,6 +57,6 @@ class Ground(Measured):
         """Delay (s) of the recorded motion against the plan's, by cross-correlation."""
         size = 2 * self.measured.size
         came = np.fft.rfft(self.measured[:, 0], size)
-        product = np.fft.irfft(came * np.conj(np.fft.rfft(self._believed[0], size)), size)
+        product = np.fft.irfft(came * np.conj(np.fft.rfft(self._believed, size)), size)
         place = int(np.argmax(np.abs(product)))
         return (place if place < size // 2 else place - size) * self._interval

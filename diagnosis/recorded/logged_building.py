@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
+from diagnosis.recorded import alike
 from diagnosis.recorded.nuisances import LoggedForce
 from diagnosis.recorded.parts import ALIKE, CALIBRATED, LATE, UNLIKE, Building
 from diagnosis.signals.earlier import earlier
@@ -15,11 +17,34 @@ from models.structures import shear_building
 from models.system import System
 
 BALANCE = "force_balance"  # signal of a building that is judged by the balance of its forces, N
+SURE = 3.0  # standard deviations from which on a stated filter is taken to lie before the master
 
 
 def logged(building: Building) -> LoggedBuilding | None:
-    """The same building, of which the forces used are known up to a logger's noise; None without its motion."""
-    return LoggedBuilding(building) if building.whole else None
+    """The same building, of which the forces used are known up to a logger's noise; None without its motion.
+
+    What was recorded lies behind the filters and delays that are stated for it, unless these lie before the master too,
+    so that what was recorded is what it used.
+    """
+    if not building.whole:
+        return None
+    plain = LoggedBuilding(building)
+    if not building.linear or len(alike.treatments(building.channels)) == 1:
+        return plain
+    behind = LoggedBuilding(building, behind=True)
+    return plain if before_master(plain.left(), behind.left()) else behind
+
+
+def before_master(plain: Array, behind: Array) -> bool:
+    """Whether stated filters lie before the master, from what is left (ticks, storeys) with and without them.
+
+    If so, the second is the first, plus what the filters change, which is known; else it has nothing of that change.
+    Fourth differences keep what no parameter of a building makes; of every fifth, white noise is independent.
+    """
+    change, left = (np.diff(x, n=4, axis=0)[::5].ravel() for x in (behind - plain, behind))
+    energy = float(change @ change)
+    part = float(left @ change)
+    return part > max(0.5 * energy, SURE * math.sqrt(energy * float(np.mean(np.square(left)))))
 
 
 class LoggedBuilding(Building):
@@ -29,22 +54,41 @@ class LoggedBuilding(Building):
     recorded by their logger's noise alone, sample by sample. In the displacement that noise would have gone through
     the building, and would look like a motion. The logger's delay and gain join the nominal parameters; what it does to
     one force it mostly does to all.
+
+    Where what was recorded lies `behind` stated filters and delays, motion, ground and every force also pass those of
+    the others: the balance of a linear building holds behind a filter as it does before it, and no filter is undone.
     """
 
     exact = False
 
-    def __init__(self, of: Building) -> None:
+    def __init__(self, of: Building, *, behind: bool = False) -> None:
         self.__dict__.update(of.__dict__)
-        self.motion = of.measured
+        self.motion, self.behind = of.measured, behind
+        if behind:
+            self.pass_alike()
         plan = self._plan
         self.signals = (BALANCE,) * plan.storeys
         self.measured = self.balance(System(plan), self.motion)
         self.present = of.present[:, : plan.storeys]
-        self.about = self._stated.late
-        late = LATE if self.about == 0.0 else max(ALIKE, UNLIKE * self.about)
+        self.about = 0.0 if of.linear else self._stated.late
+        late = ALIKE if behind else max(ALIKE, UNLIKE * self.about) if self.about else LATE
         rows = (("delay", late, self.about), ("gain", self._stated.calibration or CALIBRATED, 0.0))
         logger = tuple(LoggedForce(name, by, None, self._force, at) for name, by, at in rows if self._force)
         self.nuisances = (*of.nuisances, *logger)
+
+    def pass_alike(self) -> None:
+        """Bring motion, ground and forces behind the same filters, each as late as the own laboratory's force."""
+        position, force, used = self._inputs
+        rows = np.column_stack([self.motion, self.ground, force, used])
+        rows = alike.alike(rows, self.channels, self._stated.delay, self._interval)
+        storeys = self.motion.shape[1]
+        self.motion, self._ground = rows[:, :storeys], self._ground.copy()
+        self._ground[0, :-1] = rows[:, storeys]
+        self._inputs = position, rows[:, storeys + 1], rows[:, storeys + 2 :]
+
+    def left(self) -> Array:
+        """What the nominal building leaves of the balance, (ticks, storeys) N."""
+        return self.measured - self.predict(System(self._plan))
 
     @property
     def shortest(self) -> float:

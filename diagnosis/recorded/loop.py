@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from common.recording.imported import NOTHING_STATED, ImportedChannel
 from common.recording.run import share
 from common.roles import MASTER
 from common.signals import shared
+from diagnosis.recorded.nuisances import channels
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from laboratories.kinds import topics
@@ -36,9 +39,25 @@ class RecordedLoop:
     names: tuple[str, ...]  # response signals that were recorded
 
     def simulate(self, systems: Systems, *, linked: bool = True, seed: int | None = None) -> Signals | None:
-        """Response signals (ticks,) of systems, None where the loop diverges; `linked` with the recorded exchange."""
-        found = self.every(systems, linked=linked, seed=seed)
-        return None if found is None else {name: found[name] for name in self.names}
+        """Response signals (ticks,) of systems, as their channels are stated to record them; None where it diverges.
+
+        `linked` with the recorded exchange.
+        """
+        found, interval = self.every(systems, linked=linked, seed=seed), self.record.plan.test.interval
+        if found is None:
+            return None
+        return {name: self.stated[name].through(found[name], interval) for name in self.names}
+
+    @cached_property
+    def stated(self) -> dict[str, ImportedChannel]:
+        """The stated properties of the channels of response signals, by signal."""
+        labs = self.record.labs
+        known = {
+            name: one
+            for lab in labs
+            for name, one in zip(lab.measured, channels(self.record, lab), strict=True)
+        }
+        return {name: known.get(name, NOTHING_STATED) for name in self.names}
 
     def every(self, systems: Systems, *, linked: bool = True, seed: int | None = None) -> Signals | None:
         """All signals of systems by name, otherwise as `simulate`."""
@@ -68,11 +87,11 @@ class RecordedLoop:
         self, systems: Systems, levels: Mapping[str, float], mask: Mask | None = None
     ) -> dict[str, float]:
         """Gap that the sensors' noise alone makes: noisy simulations against one without noise."""
-        quiet = self.simulate(systems)
+        quiet = self.every(systems)
         noisy = noised(self.record, systems, levels)
         squares = dict.fromkeys(self.names, 0.0)
         for seed in range(NOISY):
-            loud = self.simulate(noisy, seed=seed)
+            loud = self.every(noisy, seed=seed)
             if quiet is None or loud is None:
                 return dict.fromkeys(self.names, 0.0)
             for name in self.names:

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from common.plan.plan import Plan
-from common.recording.imported import NOTHING_STATED
+from common.recording.imported import ImportedData
 from common.roles import MASTER
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import (
@@ -29,6 +29,7 @@ from diagnosis.signals import pieces
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
 from laboratories.kind import Machine
+from laboratories.kinds import kind_of
 from loop import replay
 from models.registry import Array
 from models.system import System
@@ -343,18 +344,17 @@ class Building(Measured):
         own, other = record.own, record.other
         if record.whole is not None:
             used = record.whole.used
+            came = [kind_of(plan, role).channels.used for role in plan.roles]
         elif other is not None:
-            used = record.signals[other.kind.channels.used][:, None]
+            used, came = record.signals[other.kind.channels.used][:, None], [other.kind.channels.used]
         else:
-            used = np.zeros((record.ticks, 0))
+            used, came = np.zeros((record.ticks, 0)), []
         names = (own.kind.channels.position, own.kind.channels.force) if own else ()
         read = [record.signals[name] for name in names] or [none, none]
         self._inputs = (read[0], read[1], used)
         self._force = own.kind.channels.force if own else ""
+        self.linear = plan.structure.columns.model == "linear"
         self._plan, self.whole = plan, record.has(*type(self).signals)
-        self._stated = (
-            channels(record, own)[own.kind.channels.names.index(self._force)] if own else NOTHING_STATED
-        )
         self._scale = own.kind.coupling(own.plan).scale if own else 1.0
         self._interval = record.plan.test.interval
         here = record.signals["ground_acceleration"]
@@ -369,6 +369,10 @@ class Building(Measured):
         ]
         self.measured = np.stack(columns, axis=1)
         self.present = np.repeat(record.present["displacement"][:, None], self.measured.shape[1], axis=1)
+        stated = record.stated or ImportedData("")
+        seen = (*self.signals, "ground_acceleration", self._force, *came)  # motion, ground and forces
+        self.channels = tuple(stated.channel(MASTER, name) for name in seen)
+        self._stated = stated.channel(MASTER, self._force)
         self.nuisances = of_building(plan)
         self.candidates = of_sites(record, ("structure",), plan)
 

@@ -55,6 +55,17 @@ def test_a_filter_attenuates_3_db_at_its_cutoff_and_delays_slow_motion(kind: str
     assert np.max(np.abs(low_pass.filtered(slow, 0.001) - expected)[500:]) < 1e-3
 
 
+@pytest.mark.parametrize("order", [1, 4, 12])
+@pytest.mark.parametrize("kind", ["butterworth", "bessel"])
+def test_a_filter_far_below_the_rate_keeps_its_digits(kind: str, order: int) -> None:
+    low_pass, interval = LoggerFilter(kind, order, 5.0), 1.0 / 4096.0
+    t = np.arange(12_000) * interval
+    seen = low_pass.filtered(np.sin(2.0 * math.pi * 2.0 * t), interval)[10_000:]
+    turned = low_pass.response(np.array([2.0]))[0] * np.exp(4j * math.pi * t[10_000:])
+    assert seen == pytest.approx(turned.imag, abs=1e-4)
+    assert low_pass.filtered(np.r_[0.0, np.ones(12_000)], interval)[-1] == pytest.approx(1.0, abs=1e-5)
+
+
 def test_a_prediction_passes_through_the_stated_filter_and_delay() -> None:
     t = np.arange(1000) * 0.002
     ramp = np.asarray(3.0 * t, dtype=np.float64)

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from typing import cast
 
 import numpy as np
 import pytest
 from scipy import signal
 
+from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, LoggerFilter
+from common.roles import MASTER
 from diagnosis.diagnose import judged, own_noise, still
 from diagnosis.findings import gaps, how_far, report, verdict
 from diagnosis.findings.found import Diagnosis
-from diagnosis.fits import residuals
+from diagnosis.fits import fitting, residuals, settling, worth
 from diagnosis.fits.residuals import over_longer
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
-from diagnosis.recorded import logged_building
+from diagnosis.recorded import alike, logged_building
+from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.logged_building import LoggedBuilding
+from diagnosis.recorded.loop import RecordedLoop
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import HowFar
@@ -28,6 +34,7 @@ from tests.diagnosis.cases import Cases, lab_a, white
 
 LEVEL = 200.0  # N
 LATE = 2  # ticks
+PASSED = LoggerFilter("bessel", 4, 60.0)
 
 
 def relogged(whole: Record, name: str, values: Array) -> Record:
@@ -188,3 +195,79 @@ def test_noise_that_only_the_controller_read_is_no_fault_of_the_building(cases: 
     assert judged(residuals.prepare(Building(unread), unread), scales, view).outcome == "none"
     heavier = cases.record({"structure.mass": {"factor": 1.1}})
     assert still(logged(heavier), scales) is None
+
+
+def stated(whole: Record, names: Sequence[str], noise: float = LEVEL) -> Record:
+    """The record as an import that states a filter and a delay for these signals, which passed both."""
+    signals, delay = dict(whole.signals), whole.plan.test.interval
+    for place, name in enumerate(names):
+        seen = ImportedChannel(PASSED, delay).through(signals[name], whole.plan.test.interval)
+        signals[name] = seen + noise * (name == "column_force") * white(40 + place, whole.ticks)
+    channels = {name: {"filter": asdict(PASSED), "delay": delay} for name in names}
+    metadata = {IMPORT: {"data": "a.csv", "channels": json.dumps({MASTER: channels})}}
+    return replace(whole, signals=signals, run=replace(whole.run, metadata=whole.run.metadata | metadata))
+
+
+def test_series_behind_different_filters_and_delays_are_brought_behind_the_same() -> None:
+    interval, ticks = 0.002, 2000
+    t = np.arange(ticks) * interval
+    motion = np.hanning(ticks) * np.sin(2.0 * np.pi * np.outer([3.0, 11.0, 23.0], t)).sum(axis=0)
+    low_pass = LoggerFilter("butterworth", 3, 30.0)
+    one, other = ImportedChannel(low_pass, interval), ImportedChannel(PASSED)
+    rows = np.column_stack([motion, one.through(motion, interval), other.through(motion, interval)])
+    found = alike.alike(rows, (NOTHING_STATED, one, other), one.delay, interval)
+    assert np.allclose(found, found[:, :1], atol=1e-3 * np.max(np.abs(motion)))
+    assert np.max(np.abs(found[:, 0] - motion)) > 0.1 * np.max(np.abs(motion))
+    biased = 5.0 + low_pass.filtered(motion, interval)  # the bias was there before the first tick
+    begun = alike.begun(biased, low_pass, interval)
+    assert begun == pytest.approx(alike.passed(5.0 + motion, low_pass, interval), abs=1e-9)
+
+
+@pytest.mark.parametrize("names", [["column_force"], ["column_force", "ground_acceleration", "acceleration"]])
+def test_a_stated_filter_of_its_force_is_no_gap_of_the_building(cases: Cases, names: list[str]) -> None:
+    seen = stated(cases.record(), names)
+    view = logged(seen)
+    assert cast(LoggedBuilding, view.part).behind
+    assert own_noise(view)
+    bare = settling.settled(fitting.fit(view, {}))
+    assert not worth.is_gap(bare)
+    assert np.max(np.abs(bare.z)) < 1.0
+
+
+def test_a_fault_of_the_building_has_its_size_behind_a_stated_filter(cases: Cases) -> None:
+    heavier = cases.record({"structure.mass": {"factor": 1.1}})
+    view = logged(stated(heavier, ["column_force"]))
+    bare = settling.settled(fitting.fit(view, {}))
+    assert worth.is_gap(bare)
+    found = settling.settled(fitting.fit(bare.data, {"structure.mass": {"factor": 1.05}}))
+    assert not worth.is_gap(found)
+    assert found.values["structure.mass"]["factor"] == pytest.approx(1.1, abs=0.02)
+
+
+def test_a_filter_before_the_master_too_leaves_the_building_exact(cases: Cases) -> None:
+    whole = cases.record()
+    seen = stated(whole, ["column_force"])
+    before = replace(seen, signals=whole.signals)  # the master used what was recorded
+    view = logged(before)
+    assert not cast(LoggedBuilding, view.part).behind
+    assert not own_noise(view)
+    louder = relogged(before, "column_force", whole.signals["column_force"] + LEVEL * white(41, whole.ticks))
+    assert not cast(LoggedBuilding, logged(louder).part).behind
+
+
+def test_a_ground_motion_is_compared_behind_its_stated_filter(cases: Cases) -> None:
+    seen = stated(cases.record(), ["ground_acceleration"])
+    part = Ground(seen, cast(Array, seen.ground))
+    left = part.measured - part.predict(seen.systems[MASTER])
+    assert np.max(np.abs(left)) < 1e-9
+
+
+def test_a_simulated_response_passes_the_stated_filter_of_its_reading(cases: Cases) -> None:
+    whole = cases.record()
+    seen = stated(whole, ["column_force", "column_displacement"], noise=0.0)
+    loops = [
+        RecordedLoop(record, cast(Array, record.ground), None, ("column_force",))
+        for record in (seen, replace(seen, run=whole.run))
+    ]
+    known, unknown = (loop.gap(loop.simulate(loop.record.systems))["column_force"] for loop in loops)
+    assert known < 0.25 * unknown
