@@ -7,9 +7,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from diagnosis.recorded import alike
 from diagnosis.recorded.nuisances import LoggedForce
 from diagnosis.recorded.parts import ALIKE, CALIBRATED, LATE, UNLIKE, Building
+from diagnosis.signals import alike
 from diagnosis.signals.earlier import earlier
 from loop.nominal import partition
 from models.registry import Array

@@ -21,13 +21,14 @@ from diagnosis.fits import fitting, residuals, settling, worth
 from diagnosis.fits.residuals import over_longer
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
-from diagnosis.recorded import alike, logged_building
+from diagnosis.recorded import logged_building
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.loop import RecordedLoop
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import HowFar
+from diagnosis.signals import alike
 from diagnosis.signals.earlier import earlier
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_a, white
