@@ -2,7 +2,8 @@
 
 Numba's on-disk cache checks a function's own file only, so it would return an outdated kernel after a change of a
 function that the kernel calls. The folder is therefore named after the content of all files of the packages that hold
-kernels.
+kernels. Within it, Numba keeps kernels apart by the place of their file and by the processor, so these are in its name
+too: a folder that one checkout has filled is empty for another one.
 """
 
 from __future__ import annotations
@@ -27,11 +28,19 @@ def fingerprint(*folders: Path) -> str:
     return digest.hexdigest()
 
 
+def place(root: Path) -> str:
+    """Sixteen hex digits that change with the place of a checkout and with the processor."""
+    from llvmlite import binding
+
+    words = str(root.resolve()), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    return hashlib.blake2b("\n".join(words).encode(), digest_size=8).hexdigest()
+
+
 @cache
 def folder() -> Path:
     """Folder for compiled kernels: in the user's cache, or in a temporary folder where that is not writable."""
     root = Path(__file__).parent.parent
-    name = fingerprint(*(root / room for room in ROOMS))
+    name = f"{fingerprint(*(root / room for room in ROOMS))}-{place(root)}"
     chosen = of_user(name)
     if chosen is None:
         chosen = Path(tempfile.gettempdir()) / f"rths-kernels-{os.getuid()}-{name}"

@@ -17,7 +17,7 @@ import loop
 import models
 from common.plan.laboratory_tables import Actuator, Column
 from laboratories.column import model as column
-from models import compiled
+from models import cache, compiled
 from models.registry import Array
 
 
@@ -68,3 +68,11 @@ def test_a_bound_kernel_refuses_arguments_of_another_type() -> None:
         move(None)
     with pytest.raises(TypeError):
         move()
+
+
+def test_every_checkout_and_processor_has_its_own_folder_of_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = cache.place(Path("/one"))
+    assert cache.folder().name.endswith(cache.place(Path(compiled.__file__).parents[1]))
+    assert cache.place(Path("/other")) != here == cache.place(Path("/one"))
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "another")
+    assert cache.place(Path("/one")) != here
