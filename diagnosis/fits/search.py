@@ -78,7 +78,11 @@ def searched(bare: Fit, scales: Scales) -> Search:
         chosen = together(chosen, scales, beside if chosen is before else None)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
     found = Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others)))
-    return plainest(believed(likeliest(found)))
+    found = plainest(believed(likeliest(found)))
+    if (chosen := fewest(found.chosen)) is found.chosen:
+        return found
+    fewer = candidates.alternatives(chosen, first, scales)
+    return plainest(Search(bare.data, bare, chosen, tuple(map(trimmed, fewer))))
 
 
 def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, list[Fit], list[Fit] | None]:
@@ -137,22 +141,46 @@ def needed(fit: Fit, most: float) -> Fit:
     return fit
 
 
-def pruned(bare: Fit, fit: Fit) -> Fit:
-    """The fit without effects that explain too little, those of the least influence first.
+def fewest(fit: Fit) -> Fit:
+    """The fit without effects that gain no more than chance does, those of the least influence first.
 
-    Beside one that changes nothing, an effect that explains a whole gap would be worth nothing either. What no motion
-    causes cannot repair the formula of what a motion does, so that beside coloured noise, of which it explains little,
-    it stays where that noise is far less likely without it.
+    An effect that was exchanged for another one may stand beside one that only the former needed.
     """
-    sizes = map(np.max, worth.changes(fit))
-    for _, name in sorted(zip(sizes, fit.names, strict=True)):
+    for name in by_influence(fit):
         if len(fit.names) < 2:
             break
         less = candidates.without(fit, name)
-        stays = fit.data.catalogue[name].motionless and settling.beats_colour(fit, less)
-        if not (stays or worth.is_worth(bare, less, fit)):
+        if not (worth.pays(*worth.gained(less, fit)) or is_there(fit, less, name)):
+            fit = less
+    return trimmed(fit)
+
+
+def by_influence(fit: Fit) -> list[str]:
+    """The effects of a fit, first those that change the residuals least."""
+    sizes = map(np.max, worth.changes(fit))
+    return [name for _, name in sorted(zip(sizes, fit.names, strict=True))]
+
+
+def pruned(bare: Fit, fit: Fit) -> Fit:
+    """The fit without effects that explain too little, those of the least influence first.
+
+    Beside one that changes nothing, an effect that explains a whole gap would be worth nothing either.
+    """
+    for name in by_influence(fit):
+        if len(fit.names) < 2:
+            break
+        less = candidates.without(fit, name)
+        if not (is_there(fit, less, name) or worth.is_worth(bare, less, fit)):
             fit = less
     return fit
+
+
+def is_there(fit: Fit, less: Fit, name: str) -> bool:
+    """Whether what no motion causes stays in a fit, without which coloured noise is far less likely.
+
+    It cannot repair the formula of what a motion does, and beside such noise it explains little.
+    """
+    return fit.data.catalogue[name].motionless and settling.beats_colour(fit, less)
 
 
 def trimmed(fit: Fit) -> Fit:

@@ -43,9 +43,8 @@ def enough(bare: Fit, fit: Fit) -> bool:
 
 def is_worth(bare: Fit, before: Fit, after: Fit) -> bool:
     """Whether the fit `after` with one effect more is worth its parameters; `bare` is the fit without effects."""
-    noise = max(1.0, after.chi / after.data.size)
-    prior, data = before.prior - after.prior, (before.chi - after.chi) / noise
-    if max(prior, 0.0) / PRIOR_GAIN + max(data, 0.0) / DATA_GAIN < 1.0 or prior + data <= 0.0:
+    prior, data = gained(before, after)
+    if not pays(prior, data):
         return False
     sizes = changes(after)
     if before is bare or idle(after, sizes):
@@ -55,6 +54,17 @@ def is_worth(bare: Fit, before: Fit, after: Fit) -> bool:
     # an effect that brings nominal parameters back as well needs to explain less: two signs of one cause
     freeing = prior > PRIOR_GAIN and excess(before) - excess(after) > HALF * excess(before)
     return not cancelling(bare, sizes) and (freeing or refines(bare, before, after))
+
+
+def gained(before: Fit, after: Fit) -> tuple[float, float]:
+    """By how much the prior's part of the cost falls, and that of the data, in units of the noise that is left."""
+    noise = max(1.0, after.chi / after.data.size)
+    return before.prior - after.prior, (before.chi - after.chi) / noise
+
+
+def pays(prior: float, data: float) -> bool:
+    """Whether what a fit with one effect more gains is more than chance gives."""
+    return max(prior, 0.0) / PRIOR_GAIN + max(data, 0.0) / DATA_GAIN >= 1.0 and prior + data > 0.0
 
 
 def moving(fit: Fit) -> float:
