@@ -31,6 +31,14 @@ def imported(data: Path, mapping: str, folder: Path) -> Path:
     return path
 
 
+def some(data: Path, folder: Path, rows: slice) -> Path:
+    """A copy of a table with its header and some of its rows."""
+    header, *values = data.read_text(encoding="utf-8").splitlines()
+    copy = folder / data.name
+    copy.write_text("\n".join([header, *values[rows]]) + "\n", encoding="utf-8")
+    return copy
+
+
 def lag_by_correlation(command: Any, response: Any, interval: float, finer: int = 8) -> float:
     """Shift at which the response resembles the command most, s."""
     places = np.arange((command.size - 1) * finer) / finer
@@ -41,8 +49,10 @@ def lag_by_correlation(command: Any, response: Any, interval: float, finer: int 
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    """The force rig's recording and the report on it."""
-    path = imported(EXAMPLES / "force_rig.csv", "force_rig", tmp_path_factory.mktemp("rig"))
+    """The recording of the force rig's first half and the report on it."""
+    folder = tmp_path_factory.mktemp("rig")
+    half = some(EXAMPLES / "force_rig.csv", folder, slice(10_000))
+    path = imported(half, "force_rig", folder)
     return path, diagnose_file(path).plain()
 
 
@@ -54,7 +64,7 @@ def test_the_force_rigs_extra_delay_agrees_with_the_cross_correlation(
     signals = read(path).columns["master"]
     interval = 1.0 / RATE
     seen = lag_by_correlation(signals["actuator_command"], signals["column_displacement"], interval)
-    assert seen == pytest.approx(0.033, abs=1e-3)
+    assert seen == pytest.approx(0.030, abs=1e-3)  # of the first half; of the whole test 33 ms
     verdict = report["which"][0]
     assert verdict["effects"] == ["actuator.time_constant"]
     factor = verdict["parameters"]["actuator.time_constant"]["factor"]["value"]
@@ -72,16 +82,20 @@ def test_the_unexplained_part_of_the_force_rigs_gap_is_reported(rig: tuple[Path,
 
 
 @pytest.mark.parametrize(
-    "name",
+    ("name", "rows"),
     [
-        "8-D22_bondslip",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("4-D22", "8-D22", "4-D22_bondslip")),
+        ("8-D22_bondslip", 3),
+        *(
+            pytest.param(name, 1, marks=pytest.mark.slow)
+            for name in ("4-D22", "8-D22", "4-D22_bondslip", "8-D22_bondslip")
+        ),
     ],
 )
 def test_a_fibre_column_is_found_to_yield_and_to_soften_with_its_largest_drift(
-    name: str, tmp_path: Path
+    name: str, rows: int, tmp_path: Path
 ) -> None:
-    report = diagnose_file(imported(COLUMNS / f"column_{name}.csv", f"column_{name}", tmp_path)).plain()
+    data = some(COLUMNS / f"column_{name}.csv", tmp_path, slice(None, None, rows))
+    report = diagnose_file(imported(data, f"column_{name}", tmp_path)).plain()
     first = report["which"][0]
     assert first["effects"] == ["column.yielding"]
     law = first["parameters"]["column.yielding"]["law"]["value"]
