@@ -18,6 +18,7 @@ from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import cost, simplest
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.threads import each
+from diagnosis.fits.unexplained import leaves
 from laboratories.effects.effect import Effect
 from models.registry import Array
 
@@ -29,6 +30,7 @@ BEYOND = (
     30.0  # times the stroke before that: no motion that meets a stop goes so far, not even an unstable one
 )
 EVERY = 5  # of so many averaged samples one judges
+ENOUGH = 0.5  # s before the first contact that may show what else a laboratory has
 
 
 def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
@@ -46,7 +48,7 @@ def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
     reached = float(np.max(stroke[: max(1, first * data.group)]))
     if reached <= 0.0 or float(np.nanmax(stroke)) > BEYOND * reached:
         return None
-    groups = first + max(10, round(AFTER / (data.system.plan.test.interval * data.group)))
+    groups = first + after(data)
     starts = [
         {stop.place: share * reached, stop.stiffness: stiffness}
         for share in INSIDE
@@ -61,6 +63,39 @@ def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
     fits = each(lambda start: grown(data, fit, effect, start, groups), begun)
     springs, others = by_law(fits, effect.name)
     return simplest(min(springs, key=cost), others)
+
+
+def after(data: Data) -> int:
+    """Averaged samples after first contact that the shortest fit covers."""
+    return max(10, round(AFTER / (data.system.plan.test.interval * data.group)))
+
+
+def stop_of(fit: Fit) -> Effect | None:
+    """The end stop among the effects of a fit."""
+    effects = (fit.data.catalogue[name] for name in fit.names)
+    return next((effect for effect in effects if effect.contact), None)
+
+
+def before(fit: Fit) -> Data | None:
+    """The data until the motion comes near the end stop of a fit; None without one, or where that is too short."""
+    effect, data = stop_of(fit), fit.data
+    if effect is None or effect.contact is None or effect.contact.motion not in data.part.signals:
+        return None
+    stroke = np.abs(data.part.measured[:, data.part.signals.index(effect.contact.motion)])
+    place = fit.values[effect.name][effect.contact.place]
+    groups = int(np.argmax(stroke >= INSIDE[0] * place)) // data.group
+    if groups * data.group * data.system.plan.test.interval < ENOUGH:
+        return None
+    return replace(data, part=data.part.first(groups * data.group), train=data.train[:groups])
+
+
+def better_before(fit: Fit, other: Fit) -> bool:
+    """Whether a fit with an end stop that leaves something misses less than another one until that stop is met."""
+    short = before(fit) if leaves(fit) else None
+    if short is None:
+        return False
+    own, others = (fitting.everywhere(fitting.at(short, item.values, item.z)) for item in (fit, other))
+    return own < others - fitting.TIED
 
 
 def by_law(fits: Sequence[Fit], name: str) -> tuple[list[Fit], list[Fit]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.fits import candidates, fitting, hypothesis, settling, trade, worth
+from diagnosis.fits import candidates, contact, fitting, hypothesis, settling, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.laws.coupled import coupled
 from diagnosis.fits.residuals import Data
@@ -207,12 +207,15 @@ def trimmed(fit: Fit) -> Fit:
 def likeliest(search: Search) -> Search:
     """The search with that one in front of as many effects that is far likelier than the chosen ones.
 
-    The effects beside an exchanged one were chosen before it, so that a further exchange may still pay.
+    The effects beside an exchanged one were chosen before it, so that a further exchange may still pay. What an end
+    stop leaves decides nothing between effects that differ before it is met.
     """
     chosen = search.chosen
     same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
     best = min(same, key=lambda fit: fit.cost, default=chosen)
     if best.cost > chosen.cost - fitting.TIED or remaining(best) > remaining(chosen):
+        return search
+    if contact.better_before(chosen, best):
         return search
     return in_front(search, best)
 

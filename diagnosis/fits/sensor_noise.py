@@ -179,6 +179,19 @@ def whitened(fit: Fit) -> Data:
     )
 
 
+def flattened(data: Data) -> Data:
+    """The data with white noise in the place of coloured noise, no louder than averaged samples of that are.
+
+    What follows the highest frequencies of a motion, as the inertia of a specimen does, hardly shows in averages, and
+    white noise of the level of single samples would hide it.
+    """
+    averaged = [
+        item.rms if item.density is None else math.sqrt(np.trapezoid(item.density, colour.GRID))
+        for item in data.noise
+    ]
+    return residuals.measured_by(replace(data, noise=()), np.minimum(data.white, averaged))
+
+
 def share(data: Data) -> float:
     """Largest of `shares`."""
     return float(np.max(shares(data), initial=0.0))

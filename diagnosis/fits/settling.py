@@ -40,7 +40,8 @@ def settled(fit: Fit, accepted: Data | None = None) -> Fit:
     """The fit under the noise that it leaves, which is that of its data.
 
     Where much of what it leaves follows from the inputs, the quiet part holds a gap as well as noise: the noise is
-    then taken to be white, of the level of the highest frequencies, beside the mains, which no machine follows.
+    then taken to be white, of the level of the highest frequencies, or of averaged samples where these are quieter,
+    beside the mains, which no machine follows.
     `accepted` are the data with the noise beside other effects, or none.
     """
     if fit.data.part.exact:
@@ -60,8 +61,8 @@ def settled(fit: Fit, accepted: Data | None = None) -> Fit:
     if sensor_noise.coloured(data):
         if not hidden(found, accepted):
             return replace(found, data=data) if found.data is not data else found
-        data = sensor_noise.remodelled(fit)
-        data = replace(data, noise=(), lines=sensor_noise.mains(found), spikes=None, heard=heard(found))
+        data = sensor_noise.flattened(sensor_noise.remodelled(fit))
+        data = replace(data, lines=sensor_noise.mains(found), spikes=None, heard=heard(found))
     return under_white(found, data, fit.data)
 
 
@@ -177,16 +178,19 @@ def beside_colour(fit: Fit, scales: Scales) -> Fit | None:
     """The fit with one effect more in the place of the coloured noise beside its effects; None where there is none.
 
     Where the first effect explains nearly all of a gap, as a zero of a sensor may, the rest of it looks like noise.
-    What two good solutions of one model may differ by is no effect.
+    What two good solutions of one model may differ by is no effect, unless nothing at all is left of it beside one.
     """
     if not sensor_noise.coloured(fit.data):
         return None
     white = fitting.polished(fitting.at(sensor_noise.whitened(fit), fit.values, fit.z))
-    if not leaves(white, model_error(white)):
+    if not leaves(white):
         return None
     rivals = sorted(in_white_noise(fit, scales), key=lambda item: evidence.surprise(remodelled(item)))
     _, found = far_likelier_ones(fit, rivals)
-    return found[0] if found and not idle(found[0], changes(found[0])) else None
+    if not found or idle(best := found[0], changes(best)):
+        return None
+    larger = leaves(white, model_error(white))
+    return best if larger or not leaves(fitting.at(white.data, best.values, best.z)) else None
 
 
 def beats_colour(fit: Fit, less: Fit) -> bool:

@@ -1,0 +1,110 @@
+"""Pairs of effects in one laboratory, of which one hides behind the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.fits import candidates, contact, fitting, residuals, sensor_noise, settling, trade
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.scales import Scales
+from diagnosis.signals import colour
+from diagnosis.signals.noise_model import NoiseModel
+from models.registry import Array
+from tests.diagnosis.cases import Cases, Effects, lab_b
+from tests.diagnosis.test_equivalents import DATA, NOISY
+
+LOUDER: Effects = {
+    "damper.stroke_stop": {"stroke": 0.04, "stiffness": 2000.0},
+    "damper.gain": {"factor": 1.1},
+}
+
+
+def fit(values: Values, z: float = 0.0, off: Array | float = 0.0) -> Fit:
+    return Fit(DATA, values, np.full(1, z), NOISY + off)
+
+
+@pytest.mark.parametrize(("density", "white"), [(0.25, 0.5), (4.0, 1.0), (None, 1.0)])
+def test_white_noise_in_the_place_of_coloured_noise_is_no_louder_than_averages(
+    density: float | None, white: float
+) -> None:
+    over = None if density is None else np.full(colour.GRID.size, density)
+    data = replace(DATA, white=np.ones(1), noise=(NoiseModel(1.0, density=over),))
+    flat = sensor_noise.flattened(data)
+    assert flat.noise == ()
+    assert flat.white == pytest.approx([white])
+
+
+@pytest.mark.parametrize(
+    ("larger", "left", "taken"), [(False, False, True), (False, True, False), (True, True, True)]
+)
+def test_a_rest_within_the_error_of_a_model_is_an_effect_only_where_nothing_of_it_is_left(
+    monkeypatch: pytest.MonkeyPatch, larger: bool, left: bool, taken: bool
+) -> None:
+    one, two = fit({"a": {}}), fit({"a": {}, "b": {}})
+
+    def leaves(item: Fit, allowed: Array | None = None) -> bool:
+        return larger if allowed is not None else left or item.names == one.names
+
+    monkeypatch.setattr(settling, "leaves", leaves)
+    monkeypatch.setattr(settling, "far_likelier_ones", lambda *_: (one, [two]))
+    monkeypatch.setattr(settling, "in_white_noise", lambda *_: [])
+    monkeypatch.setattr(settling, "changes", lambda _: [])
+    monkeypatch.setattr(sensor_noise, "coloured", lambda _: True)
+    monkeypatch.setattr(sensor_noise, "whitened", lambda item: item.data)
+    monkeypatch.setattr(fitting, "polished", lambda item: item)
+    monkeypatch.setattr(fitting, "at", lambda _data, values, _z: one if values == one.values else two)
+    assert settling.beside_colour(one, None) is (two if taken else None)  # type: ignore[arg-type]
+
+
+def test_effects_that_are_as_good_take_over_the_law_of_the_one_beside_the_best(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def pair(other: str, law: float, off: float) -> Fit:
+        return fit({"a": {"law": law}, other: {}}, off=off)
+
+    best, level, worse = pair("b", 0.0, 0.0), pair("c", 0.0, 1e-4), pair("d", 0.0, 1.0)
+    monkeypatch.setattr(candidates, "in_best_laws", lambda fits, **_: fits)
+    monkeypatch.setattr(fitting, "fit", lambda _data, values, _z: fit(values))
+    for law, follows in ((3.0, 3.0), (0.0, 0.0)):
+        monkeypatch.setattr(candidates, "in_other_laws", lambda _, law=law: pair("b", law, -0.1))
+        found = candidates.under_further_laws([best, level, worse])
+        assert [item.names[-1] for item in found] == ["b", "c", "d"]
+        assert [item.values["a"]["law"] for item in found] == [law, follows, 0.0]
+
+
+@pytest.mark.parametrize(("before", "after", "kept"), [(2.3, 0.3, 1), (1.8, 0.0, 0), (2.3, 1.5, 0)])
+def test_an_effect_that_brings_nominal_parameters_back_is_kept_beside_a_fit_that_leaves_nothing(
+    monkeypatch: pytest.MonkeyPatch, before: float, after: float, kept: int
+) -> None:
+    further = fit({"a": {}, "b": {}}, after)
+    monkeypatch.setattr(candidates, "extended", lambda *_, **__: [further])
+    assert len(trade.released(fit({"a": {}}, before), None)) == kept  # type: ignore[arg-type]
+
+
+def test_what_shows_before_an_end_stop_is_met_is_told_from_what_looks_alike_after_it(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = cases.record(LOUDER, duration=4.0)
+    part, nominal = lab_b(whole), np.zeros(7)
+    part.candidates = tuple(one for one in part.candidates if one.name.endswith(("gain", "stop")))
+    data = residuals.prepare(part, whole)
+    stop = fitting.at(data, {"damper.stroke_stop": {"stroke": 0.0402, "stiffness": 2000.0}}, nominal)
+    short = contact.before(stop)
+    assert short is not None
+    stroke = np.abs(data.part.measured[:, data.part.signals.index("damper_stroke")])
+    assert stroke[: short.groups * short.group].max() < 0.97 * 0.0402
+    true, wrong = (
+        fitting.at(data, {**stop.values, name: {"factor": 1.1}}, nominal)
+        for name in ("damper.gain", "sensor.damper_force.gain")
+    )
+    assert contact.better_before(true, wrong)
+    assert not contact.better_before(wrong, true)
+    monkeypatch.setattr(
+        contact, "grown", lambda _data, item, *_: replace(true, values=item.values | stop.values)
+    )
+    (found,) = candidates.beside_stop(stop, Scales(whole))
+    assert found.names == ("damper.stroke_stop", "damper.gain")
