@@ -67,10 +67,14 @@ def traded(
 
 
 def simplest(fits: Sequence[Fit]) -> tuple[Fit, tuple[Fit, ...]]:
-    """Of fits that the data cannot tell from the best the simplest, and those of them with more or fewer effects."""
+    """Of fits that the data cannot tell from the best the simplest, and those of them with more or fewer effects.
+
+    One that moves nominal parameters too far to be an explanation stands behind those that do not.
+    """
     best = min(fits, key=lambda item: item.cost)
     level = [item for item in fits if tied(best, item)]
-    stands = min(level, key=freedom)
+    sound = [] if worth.is_gap(best) else [item for item in level if not worth.is_gap(item)]
+    stands = min(sound or level, key=freedom)
     return stands, tuple(item for item in level if len(item.names) != len(stands.names))
 
 

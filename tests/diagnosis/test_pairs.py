@@ -85,6 +85,16 @@ def test_an_effect_that_brings_nominal_parameters_back_is_kept_beside_a_fit_that
     assert len(trade.released(fit({"a": {}}, before), None)) == kept  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(("z", "names"), [(2.4, ("a",)), (2.6, ("a", "b"))])
+def test_a_simpler_description_stands_unless_it_moves_a_nominal_parameter_too_far(
+    monkeypatch: pytest.MonkeyPatch, z: float, names: tuple[str, ...]
+) -> None:
+    monkeypatch.setattr(trade, "freedom", lambda item: (len(item.names), len(item.names)))
+    stands, others = trade.simplest([fit({"a": {}}, z), fit({"a": {}, "b": {}})])
+    assert stands.names == names
+    assert len(others) == 1
+
+
 def test_what_shows_before_an_end_stop_is_met_is_told_from_what_looks_alike_after_it(
     cases: Cases, monkeypatch: pytest.MonkeyPatch
 ) -> None:
