@@ -33,10 +33,11 @@ check: setup
 test: setup
 	$(MAKE) --no-print-directory -j 2 check tested
 
-# kernels that a change has made outdated are compiled once, before two processes would compile each of them
+# kernels that a change has made outdated are compiled once, before every worker would compile each of them; the third
+# worker computes while tests of another one wait for clocks and processes
 tested: setup
 	$(BIN)/python -m simulation.warm
-	$(BIN)/pytest -n 2 --dist worksteal -m "not slow and not faults and not soak"
+	$(BIN)/pytest -n 3 --dist worksteal -m "not slow and not faults and not soak"
 
 # what takes long or needs a machine that does little else; one worker: where a test hangs beyond reach the others get another
 slow: setup
