@@ -50,14 +50,19 @@ CURVES = {0x0072B2, 0x009E73, 0xCC79A7}  # one of them in each plot
 
 
 @pytest.fixture
-def served(tmp_path: Path, virtual_recording: Path) -> Iterator[tuple[str, threading.Thread]]:
-    """A view of a recording that does not exist yet, and what makes it grow."""
+def served(
+    tmp_path: Path, virtual_recording: Path
+) -> Iterator[tuple[str, threading.Thread, threading.Event]]:
+    """A view of a recording that does not exist yet, what makes it grow, and an event for which it waits halfway."""
     path, content = tmp_path / "growing.mcap", virtual_recording.read_bytes()
+    shown = threading.Event()
 
     def grow() -> None:
         steps = round(SECONDS / 0.05)
         with path.open("wb", buffering=0) as stream:
             for step in range(steps):
+                if step == steps // 2:
+                    shown.wait()
                 stream.write(content[len(content) * step // steps : len(content) * (step + 1) // steps])
                 time.sleep(0.05)
 
@@ -66,23 +71,25 @@ def served(tmp_path: Path, virtual_recording: Path) -> Iterator[tuple[str, threa
     with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:
-            yield process.stdout.readline().split()[-1], growing
+            yield process.stdout.readline().split()[-1], growing, shown
         finally:
             process.terminate()
+            shown.set()
             if growing.ident:
                 growing.join()
     assert process.returncode == 0
 
 
 def test_a_test_is_shown_during_its_run_and_after_its_end_on_any_screen(
-    served: tuple[str, threading.Thread], tmp_path: Path
+    served: tuple[str, threading.Thread, threading.Event], tmp_path: Path
 ) -> None:
-    url, growing = served
+    url, growing, shown = served
     with open_page(url, WIDE, 900) as page:
         page.wait(f"({TEXT})().includes('waiting for the recording to begin')")
         growing.start()
         page.wait("document.title === 'default: live'")
         page.wait(f"({TEXT})().includes('running')")
+        shown.set()
         page.wait("document.title === 'default: ended'", 40.0)
         assert faults(page, WIDE, url, tmp_path) == []
     with open_page(url, NARROW, 844) as page:
