@@ -94,6 +94,7 @@ UNRUN = {
         "rths blind --set independent --seed 7222 --cases 24 --duration 20",
         "rths blind --set independent --seed 7333 --cases 30 --duration 12",
         "rths blind --set tune --seed 9962 --cases 20 --duration 12",
+        "rths blind --set independent --seed 7444 --cases 18 --duration 12",
         "rths blind --set loggers --seed 8777 --cases 45 --duration 12",
         "rths blind --set judge --seed 8101 --only unknown,formula,catalogue --cases 24 --duration 16",
         "rths blind --set tune --only unknown --seed 9601 --cases 16 --duration 12",
