@@ -11,15 +11,15 @@ from scipy.optimize import lsq_linear
 
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import NEAR, Fit
-from diagnosis.fits.scales import Scales
+from diagnosis.fits.scales import FARTHEST, Scales
 from diagnosis.fits.threads import each
 from laboratories.effects.effect import Effect
 from models.registry import Array
 
 # Of a start whose size must stay as it is: about as much as a fit then moves its shape.
 UNSTRETCHED = (0.5, 1.5)
-# Times that a start at the end of its stretch is moved there and looked at again; of all that a fit costs, what it must
-# promise for that.
+# How often a start that promises most at the end of its stretch is moved there and looked at again, and the share of
+# what a fit costs that it must promise for that.
 FARTHER, MUCH = 3, 0.02
 
 
@@ -105,15 +105,14 @@ def look_from(
     effect: Effect, values: dict[str, float], plane: Plane, scales: Scales
 ) -> tuple[ScreenedEffect, bool]:
     """The size along the line through a start that promises most, and whether it is as far as a start is stretched."""
-    fit, (least, most) = plane.fit, scales.stretch(effect)
+    fit = plane.fit
     moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: values}))
-    gain, share, z = plane.gain((moved - fit.reduced).ravel(), (least, most))
-    at_end = share in (least, most) and share not in (0.0, *UNSTRETCHED)
-    return ScreenedEffect(effect, scales.stretched(effect, values, share), z, gain), at_end
+    gain, share, z = plane.gain((moved - fit.reduced).ravel(), scales.stretch(effect))
+    return ScreenedEffect(effect, scales.stretched(effect, values, share), z, gain), abs(share) == FARTHEST
 
 
 def look_farther(item: ScreenedEffect, at_end: bool, plane: Plane, scales: Scales) -> ScreenedEffect:
-    """The effect at a larger size where it promises much, and more the farther it goes.
+    """The effect at a larger size, where it promises much and promises most at the end of its stretch.
 
     A force that stands still, as an offset, may be many times what a reading of forces shows of the motion.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -141,42 +142,37 @@ def needed(fit: Fit, most: float) -> Fit:
     return fit
 
 
+def pruned(bare: Fit, fit: Fit) -> Fit:
+    """The fit without effects that explain too little."""
+    return cleared(fit, lambda less, fit: worth.is_worth(bare, less, fit))
+
+
 def fewest(fit: Fit) -> Fit:
-    """The fit without effects that gain no more than chance does, those of the least influence first.
+    """The fit without effects that gain no more than chance does.
 
     An effect that was exchanged for another one may stand beside one that only the former needed.
     """
-    for name in by_influence(fit):
-        if len(fit.names) < 2:
-            break
-        less = candidates.without(fit, name)
-        if not (worth.pays(*worth.gained(less, fit)) or is_there(fit, less, name)):
-            fit = less
-    return trimmed(fit)
+    return trimmed(cleared(fit, lambda less, fit: worth.pays(*worth.gained(less, fit))))
 
 
-def by_influence(fit: Fit) -> list[str]:
-    """The effects of a fit, first those that change the residuals least."""
-    sizes = map(np.max, worth.changes(fit))
-    return [name for _, name in sorted(zip(sizes, fit.names, strict=True))]
+def cleared(fit: Fit, stays: Callable[[Fit, Fit], bool]) -> Fit:
+    """The fit without effects that do not stay, as fits without and with one say; at least one effect is left.
 
-
-def pruned(bare: Fit, fit: Fit) -> Fit:
-    """The fit without effects that explain too little, those of the least influence first.
-
-    Beside one that changes nothing, an effect that explains a whole gap would be worth nothing either.
+    Those that change the residuals least are judged first: beside one that changes nothing, an effect that explains a
+    whole gap would be worth nothing either.
     """
-    for name in by_influence(fit):
+    sizes = map(np.max, worth.changes(fit))
+    for _, name in sorted(zip(sizes, fit.names, strict=True)):
         if len(fit.names) < 2:
             break
         less = candidates.without(fit, name)
-        if not (is_there(fit, less, name) or worth.is_worth(bare, less, fit)):
+        if not (is_there(fit, less, name) or stays(less, fit)):
             fit = less
     return fit
 
 
 def is_there(fit: Fit, less: Fit, name: str) -> bool:
-    """Whether what no motion causes stays in a fit, without which coloured noise is far less likely.
+    """Whether an effect that no motion causes stays, because the coloured noise is far less likely without it.
 
     It cannot repair the formula of what a motion does, and beside such noise it explains little.
     """

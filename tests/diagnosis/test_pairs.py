@@ -1,4 +1,4 @@
-"""Pairs of effects in one laboratory, of which one hides behind the other."""
+"""Pairs of effects in one laboratory: one that hides behind the other is found, one that is not there taken away."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.fits import candidates, contact, fitting, residuals, sensor_noise, settling, trade
+from diagnosis.fits import candidates, contact, fitting, residuals, sensor_noise, settling, trade, worth
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import fewest, pruned
 from diagnosis.signals import colour
 from diagnosis.signals.noise_model import NoiseModel
 from models.registry import Array
@@ -118,3 +119,55 @@ def test_what_shows_before_an_end_stop_is_met_is_told_from_what_looks_alike_afte
     )
     (found,) = candidates.beside_stop(stop, Scales(whole))
     assert found.names == ("damper.stroke_stop", "damper.gain")
+
+
+@pytest.mark.parametrize(
+    ("name", "likely", "kept"),
+    [
+        ("sensor.damper_stroke.drift", True, True),
+        ("sensor.damper_stroke.drift", False, False),
+        ("damper.stiffness", True, False),
+    ],
+)
+def test_what_no_motion_causes_stays_where_coloured_noise_is_far_less_likely(
+    monkeypatch: pytest.MonkeyPatch, name: str, likely: bool, kept: bool
+) -> None:
+    bare, both = (
+        Fit(DATA, {key: {} for key in names}, np.zeros(0), NOISY) for names in ((), (name, "damper.friction"))
+    )
+
+    def without(fit: Fit, gone: str) -> Fit:
+        return replace(fit, values={key: values for key, values in fit.values.items() if key != gone})
+
+    monkeypatch.setattr(candidates, "without", without)
+    monkeypatch.setattr(worth, "changes", lambda fit: [np.ones(2)] * len(fit.names))
+    monkeypatch.setattr(worth, "is_worth", lambda _bare, less, _fit: "damper.friction" not in less.names)
+    monkeypatch.setattr("diagnosis.fits.settling.beats_colour", lambda *_: likely)
+    assert (name in pruned(bare, both).names) is kept
+
+
+def test_an_effect_that_changes_nothing_goes_before_the_one_that_explains_the_gap(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    names = "damper.stiffness", "sensor.table_acceleration.bias"
+    both = Fit(DATA, {name: {} for name in names}, np.zeros(0), NOISY)
+
+    def without(fit: Fit, gone: str) -> Fit:
+        return replace(fit, values={key: values for key, values in fit.values.items() if key != gone})
+
+    monkeypatch.setattr(candidates, "without", without)
+    monkeypatch.setattr(worth, "changes", lambda fit: [np.full(2, 1e6), np.full(2, 1e-3)][: len(fit.names)])
+    monkeypatch.setattr("diagnosis.fits.settling.beats_colour", lambda *_: False)
+    assert pruned(replace(both, values={}), both).names == names[:1]
+
+
+def test_an_effect_that_gains_no_more_than_chance_is_taken_away_at_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    one, both = fit({"damper.mass": {}}, off=0.5), fit({"damper.mass": {}, "damper.stiffness": {}})
+    monkeypatch.setattr(candidates, "without", lambda item, _: replace(one, reduced=item.reduced))
+    monkeypatch.setattr(worth, "changes", lambda item: [np.ones(2)] * len(item.names))
+    monkeypatch.setattr("diagnosis.fits.search.trimmed", lambda item: item)
+    assert fewest(both).names == one.names
+    monkeypatch.setattr(candidates, "without", lambda *_: one)
+    assert fewest(both) is both

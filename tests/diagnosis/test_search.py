@@ -12,7 +12,7 @@ from diagnosis.fits import candidates, fitting, residuals, screening, unexplaine
 from diagnosis.fits import search as searching
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import Search, believed, likeliest, pruned, search, together, trimmed
+from diagnosis.fits.search import Search, believed, likeliest, search, together, trimmed
 from laboratories.effects import CATALOGUE
 from tests.diagnosis.cases import Cases, Effects, counts_as, estimate, lab_a, lab_b, named, white
 from tests.diagnosis.test_equivalents import DATA, NOISY
@@ -360,46 +360,6 @@ def test_effects_at_the_end_of_their_ranges_stand_behind_others_that_leave_nothi
     monkeypatch.setattr("diagnosis.fits.search.remaining", lambda _: left)
     assert believed(Search(data, bare, end, (other,))).chosen.names == (first,)
     assert believed(Search(data, bare, other, (end,))).chosen is other
-
-
-@pytest.mark.parametrize(
-    ("name", "likely", "kept"),
-    [
-        ("sensor.damper_stroke.drift", True, True),
-        ("sensor.damper_stroke.drift", False, False),
-        ("damper.stiffness", True, False),
-    ],
-)
-def test_what_no_motion_causes_stays_where_coloured_noise_is_far_less_likely(
-    monkeypatch: pytest.MonkeyPatch, name: str, likely: bool, kept: bool
-) -> None:
-    bare, both = (
-        Fit(DATA, {key: {} for key in names}, np.zeros(0), NOISY) for names in ((), (name, "damper.friction"))
-    )
-
-    def without(fit: Fit, gone: str) -> Fit:
-        return replace(fit, values={key: values for key, values in fit.values.items() if key != gone})
-
-    monkeypatch.setattr(candidates, "without", without)
-    monkeypatch.setattr(worth, "changes", lambda fit: [np.ones(2)] * len(fit.names))
-    monkeypatch.setattr(worth, "is_worth", lambda _bare, less, _fit: "damper.friction" not in less.names)
-    monkeypatch.setattr("diagnosis.fits.settling.beats_colour", lambda *_: likely)
-    assert (name in pruned(bare, both).names) is kept
-
-
-def test_an_effect_that_changes_nothing_goes_before_the_one_that_explains_the_gap(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    names = "damper.stiffness", "sensor.table_acceleration.bias"
-    both = Fit(DATA, {name: {} for name in names}, np.zeros(0), NOISY)
-
-    def without(fit: Fit, gone: str) -> Fit:
-        return replace(fit, values={key: values for key, values in fit.values.items() if key != gone})
-
-    monkeypatch.setattr(candidates, "without", without)
-    monkeypatch.setattr(worth, "changes", lambda fit: [np.full(2, 1e6), np.full(2, 1e-3)][: len(fit.names)])
-    monkeypatch.setattr("diagnosis.fits.settling.beats_colour", lambda *_: False)
-    assert pruned(replace(both, values={}), both).names == names[:1]
 
 
 def test_a_force_that_stands_still_is_looked_for_far_beyond_what_the_motion_makes(cases: Cases) -> None:
