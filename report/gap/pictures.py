@@ -34,7 +34,8 @@ ZOOM = 4.0
 
 def svg(canvas: Any) -> str:
     """A figure as SVG for a page: black and blue follow the page's colours, and there is no background."""
-    fit_labels(canvas)
+    if not fit_labels(canvas):
+        canvas.set_layout_engine("none")  # or saving draws it once more to place its axes
     stream = io.StringIO()
     canvas.savefig(stream, format="svg", transparent=True, metadata=STAMPS[".svg"])
     text = stream.getvalue()

@@ -68,9 +68,10 @@ def figure(width: float = DOUBLE, height: float = 6.0) -> Any:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def fit_labels(canvas: Any) -> None:
-    """Break the labels of axes that would be cut off by the figure's edge into lines."""
-    canvas.draw_without_rendering()
+def fit_labels(canvas: Any) -> bool:
+    """Place the axes of a figure, and break labels that its edge would cut off into lines; whether there are any."""
+    canvas.get_layout_engine().execute(canvas)
+    found = False
     for axis in canvas.axes:
         for label, size in ((axis.xaxis.label, canvas.bbox.width), (axis.yaxis.label, canvas.bbox.height)):
             box = label.get_window_extent()
@@ -81,6 +82,8 @@ def fit_labels(canvas: Any) -> None:
                 room = 2.0 * min(middle, size - middle)
                 letters = max(int(0.85 * len(words) * room / (end - begin)), 8)
                 label.set_text("\n".join(textwrap.wrap(words, letters)))
+                found = True
+    return found
 
 
 def save(canvas: Any, path: Path) -> None:

@@ -251,7 +251,7 @@ def test_series_may_contain_gaps_and_differ_in_length() -> None:
     part["signals"][0]["nominal"] = part["signals"][0]["nominal"][:50]
     part["signals"][0]["measured"] = [None] * len(part["signals"][0]["t"])
     report["details"]["parts"][1]["amplitudes"]["ratio"] = [None] * 5
-    drawn, whole = (page(read(one)).count("<figure") for one in (report, fresh("explained")))
+    drawn, whole = (text.count("<figure") for text in (page(read(report)), page_of("explained")))
     assert drawn == whole - 1  # the picture of the reading whose samples are all unknown
 
 

@@ -23,6 +23,7 @@ from report.text.formats import (
     span,
     times,
 )
+from tests.rths.diagnosis_report.pieces import bare
 from tests.rths.diagnosis_report.reports import fresh
 
 
@@ -63,7 +64,7 @@ def candidate(*names: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("others", [(), ("damper.friction",)])
 def test_no_word_is_repeated_in_the_name_of_an_effect(others: tuple[str, ...]) -> None:
-    explained = fresh("explained")
+    explained = bare("explained")
     for name in CATALOGUE:
         report = read(explained | {"which": [candidate(name, *others)]})
         lines = summary(report).splitlines()
