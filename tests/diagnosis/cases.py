@@ -27,6 +27,7 @@ from rths.examine.diagnose import diagnose_file
 from simulation import virtual
 
 SECONDS = 10.0
+STRONGEST = 4.0  # s, from the beginning: the strongest motion lies in them
 JITTERED = (  # nominal parameters that no laboratory meets exactly
     ("actuator", "delay"),
     ("actuator", "time_constant"),
@@ -83,22 +84,26 @@ def lab_b(whole: Record) -> LaboratoryPart:
 
 
 class Cases:
-    """Recordings and reports, each made at its first request, by any of the workers that share a run's tests."""
+    """Recordings and reports, each made at its first request, by any of the workers that share a run's tests.
 
-    def __init__(self, factory: pytest.TempPathFactory) -> None:
+    A recording that is asked for without a duration takes `seconds` s.
+    """
+
+    def __init__(self, factory: pytest.TempPathFactory, seconds: float = SECONDS) -> None:
+        self.seconds = seconds
         base = factory.getbasetemp()
         self.folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cases"
         self.folder.mkdir(exist_ok=True)
 
     def file(
-        self, effects: Effects | None = None, seed: int = 1, duration: float = SECONDS, scale: float = 0.1
+        self, effects: Effects | None = None, seed: int = 1, duration: float | None = None, scale: float = 0.1
     ) -> Path:
         """The recording of a case; `seed` draws the noise and the errors of the nominal parameters (0: no errors)."""
-        chosen = effects or {}
-        key = repr((chosen, seed, duration, scale))
+        chosen, seconds = effects or {}, duration or self.seconds
+        key = repr((chosen, seed, seconds, scale))
         path = self.folder / f"{hashlib.sha256(key.encode()).hexdigest()[:16]}.mcap"
         if not path.exists():
-            begun, base = path.with_suffix(f".{os.getpid()}.mcap"), short(duration, scale=scale)
+            begun, base = path.with_suffix(f".{os.getpid()}.mcap"), short(seconds, scale=scale)
             error = play(base, tables(base, chosen, jitter(seed) if seed else {}, seed), begun)
             assert error is None or isinstance(error, InterlockError)
             begun.replace(path)

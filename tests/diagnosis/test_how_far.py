@@ -19,7 +19,7 @@ from diagnosis.findings.where import SiteTrace
 from diagnosis.recorded import record
 from diagnosis.recorded.loop import closed_share, overall
 from rths.examine.diagnose import diagnose_file
-from tests.diagnosis.cases import Cases, Effects
+from tests.diagnosis.cases import SECONDS, STRONGEST, Cases, Effects
 
 FOUND: dict[str, Effects] = {
     "column": {"column.friction": {"force": 900.0}},
@@ -27,6 +27,12 @@ FOUND: dict[str, Effects] = {
     "table": {"table.gain": {"factor": 0.93}},
     "two": {"column.friction": {"force": 900.0}, "damper.friction": {"force": 3.0}},
 }
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
+    """Recordings with known secrets, made on demand, no longer than the strongest motion."""
+    return Cases(tmp_path_factory, STRONGEST)
 
 
 @pytest.mark.parametrize("kind", FOUND)
@@ -190,7 +196,7 @@ def test_a_named_site_keeps_its_trace_where_something_is_left_there(
 
 
 def test_withheld_time_is_between_15_and_60_percent_of_the_test(cases: Cases) -> None:
-    mask, _ = gaps.judging(Diagnosis(cases.record()))
+    mask, _ = gaps.judging(Diagnosis(cases.record(duration=SECONDS)))
     assert 0.15 < np.mean(mask) < 0.6
     assert not mask.all()
 

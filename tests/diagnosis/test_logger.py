@@ -19,7 +19,7 @@ from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.record import Record
 from models.registry import Array
 from models.system import System
-from tests.diagnosis.cases import Cases, lab_a, lab_b
+from tests.diagnosis.cases import STRONGEST, Cases, lab_a, lab_b
 
 UNKNOWN_TO_A_LOGGER = ("damper_force_used", "column_target", "table_target")
 FILTER = signal.butter(4, 100.0, fs=500.0)  # before the converter, Hz
@@ -108,7 +108,8 @@ def test_an_effect_keeps_its_name_beside_a_loud_hum(cases: Cases) -> None:
 
 
 def test_an_effect_keeps_its_name_beside_loud_coloured_noise(cases: Cases) -> None:
-    found = examine(imported(cases.record({"damper.stiffness": {"factor": 0.7}}), noisy))
+    soft = cases.record({"damper.stiffness": {"factor": 0.7}}, duration=STRONGEST)
+    found = examine(imported(soft, noisy))
     (laboratory,) = (item for item in found.verdicts if item.effects)
     assert (laboratory.effects, laboratory.outcome) == (("damper.stiffness",), "explained")
     assert all(item.steady for item in laboratory.search.data.noise)

@@ -16,7 +16,7 @@ from diagnosis.report import read
 from diagnosis.report.schema import schema
 from report.gap import page
 from rths.examine.diagnose import diagnose_file
-from tests.diagnosis.cases import Cases, Effects
+from tests.diagnosis.cases import STRONGEST, Cases, Effects
 
 KINDS: dict[str, Effects] = {
     "clean": {},
@@ -29,9 +29,15 @@ KINDS: dict[str, Effects] = {
 SECONDS = {"link": 8.0, "reading": 8.0}
 
 
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
+    """Recordings with known secrets, made on demand, no longer than the strongest motion."""
+    return Cases(tmp_path_factory, STRONGEST)
+
+
 def report_of(cases: Cases, kind: str) -> dict[str, Any]:
     """The report on a case of this kind."""
-    return cases.report(KINDS[kind], duration=SECONDS.get(kind, 10.0))
+    return cases.report(KINDS[kind], duration=SECONDS.get(kind))
 
 
 def numbers(value: Any) -> Iterator[float]:

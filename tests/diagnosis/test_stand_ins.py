@@ -24,7 +24,7 @@ from diagnosis.report.records import PartOfGap
 from diagnosis.signals.noise_model import Source
 from models.registry import Array
 from report.gap import wording
-from tests.diagnosis.cases import Cases, lab_a, lab_b, white
+from tests.diagnosis.cases import STRONGEST, Cases, lab_a, lab_b, white
 from tests.diagnosis.test_equivalents import DATA, NOISY
 
 GAP = np.sin(0.2 * np.arange(DATA.groups))[:, None]
@@ -317,7 +317,7 @@ def test_an_effect_that_is_hardly_the_cause_stands_in_for_it() -> None:
 def test_an_unknown_effect_in_one_part_does_not_hide_the_name_of_another(
     cases: Cases, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = examine(cases.record({"damper.friction": {"force": 3.0}}))
+    found = examine(cases.record({"damper.friction": {"force": 3.0}}, duration=STRONGEST))
     strange = [item if item.effects else replace(item, outcome="unknown") for item in found.verdicts]
     assert status_of(replace(found, verdicts=strange)) == "partly_explained"
     assert (
