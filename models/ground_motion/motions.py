@@ -6,6 +6,7 @@ import difflib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -62,13 +63,25 @@ def load(record: str, base: Path, dt: float = 0.0, unit: str = "") -> GroundMoti
     Raises:
         InputError: there is neither, the file cannot be read, or it says another interval or unit.
     """
-    shipped = MOTIONS.get(record)
-    path = FOLDER / shipped.file if shipped else base / record
+    return shipped(record, dt, unit) if record in MOTIONS else of_file(record, base / record, dt, unit)
+
+
+@cache
+def shipped(record: str, dt: float, unit: str) -> GroundMotion:
+    """The record that ships under this name, read once by a process; see `load`."""
+    found = MOTIONS[record]
+    path = FOLDER / found.file
+    motion = of_file(record, path, dt, unit if reader(path) else "")
+    return replace(motion, name=found.name, version=found.version)
+
+
+def of_file(record: str, path: Path, dt: float, unit: str) -> GroundMotion:
+    """The motion in a file, which a plan calls `record`; see `load`."""
     if not path.is_file():
         raise InputError(missing(record, path))
     own = reader(path)
     with np.errstate(over="ignore", invalid="ignore"):
-        motion = own(path) if own else read_csv(path, dt, "" if shipped else unit)
+        motion = own(path) if own else read_csv(path, dt, unit)
     if own and unit:
         raise InputError(
             f"{path} says its unit itself: leave out unit in [ground_motion], which is for files of columns."
@@ -76,7 +89,7 @@ def load(record: str, base: Path, dt: float = 0.0, unit: str = "") -> GroundMoti
     if own:
         same_interval(path, motion.interval, dt)
     check(path, motion)
-    return replace(motion, name=shipped.name, version=shipped.version) if shipped else motion
+    return motion
 
 
 def check(path: Path, motion: GroundMotion) -> None:
