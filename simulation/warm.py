@@ -9,22 +9,28 @@ from pathlib import Path
 import numpy as np
 
 from common.plan.kinds import COLUMN
+from common.plan.laboratory_tables import ShakingTable
 from common.plan.plan import Plan
 from common.plan.read import parse, with_test
 from common.signals import default_topics
 from laboratories import completeness, device, kinds
+from laboratories.identification import actuator, damper, table
+from laboratories.identification import device as identified
 from laboratories.limits import TickLimits
 from laboratories.sensors import readings
 from loop import assembly, replay, site, substructure
 from loop.closed_loop import simulate
+from loop.nominal import limited
 from loop.nominal.response import response
-from models import cache, compensators, energy_balance, force_correction
+from models import cache, compensators, energy_balance, force_correction, preisach
 from models.compiled import bound
 from models.registry import Array
+from models.specimens import fit
 from models.system import System
 from recorder.encoding import RowEncoder, RowTable
 from simulation.sweep.intensity import spectral_acceleration
 
+LAW = preisach.Grid((1.0,), (1.0,), (1.0,))  # of one element, for a kernel's types
 SHORT = 0.01  # s: five ticks of the default interval; a kernel is compiled by its first call
 TWO_TABLES = "[slave.a]\n[slave.b]\n"
 
@@ -44,6 +50,7 @@ def compile_all() -> None:
     ticks(plan, ground)
     of_users(drive)
     recorded(plan.storeys)
+    examined(drive)
     (cache.folder() / cache.READY).touch()
 
 
@@ -86,6 +93,21 @@ def of_users(drive: Array) -> None:
     bound(device.enter_device, lab, truth, 0.0, 0.0)
     completeness.driven(lab.step, lab.parameters, lab.state, truth, 0.0, 1)
     site.play(site.none(len(drive))._replace(lab=lab), drive, 1.0, 0, len(drive))
+
+
+def examined(drive: Array) -> None:
+    """The kernels with which recordings are examined, and laws and laboratories fitted to them."""
+    of_recording, alone, truth = drive[:, 0], drive[:, 0].copy(), np.zeros(1)
+    for column in (of_recording, alone):
+        limited.peak(column)
+        limited.largest_steps(column)
+        limited.largest_lasting(column, column, 0)
+        preisach.features(preisach.pack(LAW, 1.0, 1.0), column, alone)
+    fit.forces("linear", {"stiffness": 1.0}, alone)
+    actuator.response(alone, SHORT, 0.0, SHORT)
+    table.response(alone, SHORT, ShakingTable())
+    damper.response(np.ones(len(damper.NAMES)), alone, alone, SHORT)
+    identified.response(kinds.nothing().device, alone, alone, truth.size)
 
 
 if __name__ == "__main__":
