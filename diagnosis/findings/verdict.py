@@ -8,15 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.findings.sensors.common_noise import in_common
-from diagnosis.findings.sensors.slow_noise import heard_as_noise, lone_noise, moves
+from diagnosis.findings.sensors.own_reading import machine_alone
+from diagnosis.findings.sensors.slow_noise import moves, under_less_noise
 from diagnosis.findings.sites.likely import APART, REST, ranked
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit, at_end
 from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.residuals import Data
-from diagnosis.fits.search import Search, exchanged_pair, likeliest
-from diagnosis.fits.threads import each
+from diagnosis.fits.search import Search, exchanged_pair
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps, leaves, model_error
 from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN
@@ -36,7 +35,6 @@ MOST_LEFT = 0.2  # of a gap's rms that effects may leave as an error of such sol
 # Share of a gap's rms that may be taken for coloured noise where only the residual itself is evidence: a sixth of its
 # energy.
 OWN = 0.4
-AGAIN = 6  # steps of a fit under another noise, from where it was
 # Standard deviations of Σ z² above its mean from which on the nominal parameters speak against the effects beside them.
 STRAINED = 3.0
 # Share of a gap's energy beyond any that these stand-ins explained.
@@ -72,12 +70,13 @@ class PartVerdict:
 
 def judge(search: Search) -> PartVerdict:
     """The verdict on a part."""
+    less, name = under_less_noise(search)
     if not search.chosen.names:
-        bare, name = heard_as_noise(search)
-        outcome = without_effects(bare)
-        return PartVerdict(bare, outcome, 1.0, (), (), doubted=name if outcome == "unknown" else "")
-    search, name = beside_lone_noise(search)
-    return replace(with_effects(search), doubted=name)
+        outcome = without_effects(less)
+        return PartVerdict(less, outcome, 1.0, (), (), doubted=name if outcome == "unknown" else "")
+    if less is not search and how_well(less) == "explained":
+        less, name = search, ""
+    return replace(with_effects(machine_alone(less)), doubted=name)
 
 
 def with_effects(search: Search) -> PartVerdict:
@@ -166,22 +165,6 @@ def shaken(verdict: PartVerdict, usual: Mapping[str, float]) -> PartVerdict | No
     return PartVerdict(
         replace(search, data=data, commissioned=bare, chosen=bare), "unknown", 1.0, verdict.others, ()
     )
-
-
-def beside_lone_noise(search: Search) -> tuple[Search, str]:
-    """A search with effects under noise that all readings have, where a lone one with loud slow noise hides a gap.
-
-    With it goes the reading of which that is doubtful, empty where there is none or the effects explain it as well.
-    """
-    name = lone_noise(search.chosen)
-    if not name:
-        return search, ""
-    data = in_common(search.chosen)
-    fits = (search.commissioned, search.chosen, *search.alternatives)
-    bare, chosen, *others = each(lambda fit: fitting.fit(data, fit.values, fit.z, AGAIN, rounds=1), fits)
-    others.sort(key=lambda fit: fit.cost)
-    common = likeliest(Search(data, bare, chosen, tuple(others)))
-    return (search, "") if how_well(common) == "explained" else (common, name)
 
 
 def without_effects(search: Search) -> Outcome:

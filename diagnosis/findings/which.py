@@ -70,7 +70,8 @@ def trusted(
     near = float(np.prod([trust.share_likeliest(verdict) for verdict in named]))
     left = [item for item in named if item.outcome == "partly"]
     shares = [trust.share_named(item.search.explained) for item in left]
-    return trust.less_by_freedom(min(near, trust.PARTLY.probability(signs), *shares), left)
+    probability = trust.less_by_freedom(min(near, trust.PARTLY.probability(signs), *shares), left)
+    return trust.EITHER * probability if any(map(trust.of_the_plan, left)) else probability
 
 
 def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:

@@ -79,6 +79,15 @@ def test_an_unknown_error_of_a_reading_changes_that_alone(cases: Cases, name: st
     assert where.culprits(fit)[0] == name
 
 
+def test_what_moves_the_ground_under_a_table_is_felt_by_all_but_its_displacement(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_b(whole)
+    data = residuals.prepare(part, whole)
+    felt = commanded(part, 0, ripple).predict(data.system)
+    felt[:, part.signals.index("table_displacement")] = part.predict(data.system)[:, 0]
+    assert likely_sites(judged(part, data, felt)) == ("table",)
+
+
 def test_what_the_mass_of_a_damper_carries_along_lies_at_the_damper(cases: Cases) -> None:
     whole = cases.record(duration=SECONDS)
     part = lab_b(whole)

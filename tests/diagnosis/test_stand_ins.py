@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +11,14 @@ from scipy import signal
 
 from diagnosis.diagnose import doubted, examine
 from diagnosis.findings import where
-from diagnosis.findings.certainty.trust import less_by_freedom, share_named
+from diagnosis.findings.certainty.trust import less_by_freedom, of_the_plan, share_named
 from diagnosis.findings.report import status_of
+from diagnosis.findings.sensors.own_reading import machine_alone
 from diagnosis.findings.sensors.slow_noise import lone_noise
 from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
 from diagnosis.fits.fitting import Fit, at_end
-from diagnosis.fits.hypothesis import TOLERANCES
+from diagnosis.fits.hypothesis import TOLERANCES, Values
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
 from diagnosis.recorded.record import Record
@@ -81,6 +83,30 @@ def test_what_a_law_of_many_parameters_explains_says_less_for_it() -> None:
     shapes = {"asymmetry": 0.2, "drop": 0.3, "speed": 0.02, "law": 1.0}
     assert probability() == pytest.approx(0.5, abs=0.03)
     assert 0.3 < probability(**shapes) < probability() - 0.05
+
+
+@pytest.mark.parametrize(
+    ("effects", "only"),
+    [
+        ({"damper.mass": {"factor": 1.1}}, True),
+        ({"actuator.delay": {"delay": 2e-3}, "column.stiffness": {"factor": 1.2}}, True),
+        ({"damper.mass": {"factor": 1.1}, "damper.friction": {"force": 3.0}}, False),
+    ],
+)
+def test_what_other_values_of_the_plan_leave_has_another_cause(effects: Values, only: bool) -> None:
+    chosen = Fit(DATA, effects, np.zeros(0), NOISY)
+    assert of_the_plan(PartVerdict(Search(DATA, chosen, chosen, ()), "partly", 0.5, (), ())) == only
+
+
+@pytest.mark.parametrize(("factor", "others"), [(1.01, 0), (1.3, 1)])
+def test_a_small_error_of_a_load_cell_is_the_law_of_its_specimen(
+    cases: Cases, factor: float, others: int
+) -> None:
+    effects = {"column.hardening": {"share": 0.3}, "sensor.column_force.gain": {"factor": factor}}
+    whole = cases.record(effects, duration=8.0)
+    data = residuals.prepare(lab_a(whole), whole)
+    found = Search(data, fitting.fit(data, {}), fitting.fit(data, effects), ())
+    assert machine_alone(found).chosen.names == tuple(effects)[: 1 + others]
 
 
 def test_errors_of_readings_that_leave_a_tenth_of_a_gap_are_not_its_cause() -> None:
@@ -213,15 +239,32 @@ def test_slow_noise_far_louder_than_that_of_all_other_readings_may_be_an_unknown
     assert judged(alike).doubted == ""
 
 
-def moved_table(whole: Record) -> Record:
-    """The record of a slave whose table moves slowly beside its command."""
+def moved_by(whole: Record, more: Array) -> Record:
+    """The record of a slave whose table makes `more` motion (ticks,) in m than its command says."""
     part = lab_b(whole)
     command = next(iter(part.inputs))
-    slow = signal.lfilter([AR1], [1.0, -0.95], white(43, whole.ticks))
-    change = part.replaced(inputs=part.inputs | {command: part.inputs[command] + SHAKEN * slow})
+    change = part.replaced(inputs=part.inputs | {command: part.inputs[command] + more})
     system = residuals.prepare(part, whole).system
-    more = dict(zip(part.signals, (change.predict(system) - part.predict(system)).T, strict=True))
-    return replace(whole, signals=whole.signals | {name: whole.signals[name] + x for name, x in more.items()})
+    shown = dict(zip(part.signals, (change.predict(system) - part.predict(system)).T, strict=True))
+    return replace(
+        whole, signals=whole.signals | {name: whole.signals[name] + x for name, x in shown.items()}
+    )
+
+
+def moved_table(whole: Record) -> Record:
+    """The record of a slave whose table moves slowly beside its command."""
+    return moved_by(whole, SHAKEN * signal.lfilter([AR1], [1.0, -0.95], white(43, whole.ticks)))
+
+
+def rattling(ticks: int) -> Array:
+    """A rattle (ticks,) in m in no relation to a table's command."""
+    return np.asarray(2e-4 * np.sin(0.4 * np.arange(ticks)) * white(43, ticks))
+
+
+def kicks(ticks: int) -> Array:
+    """Kicks (ticks,) in m of 14 ms, hardly louder at any frequency than the noise of a sensor."""
+    times = np.where(np.arange(ticks) % 97 == 0, np.sign(white(43, ticks)), 0.0)
+    return np.asarray(3e-5 * np.convolve(times, np.hanning(9))[:ticks])
 
 
 def test_the_site_of_a_gap_is_sought_beside_the_noise_that_all_readings_have(cases: Cases) -> None:
@@ -249,19 +292,23 @@ def test_loud_slow_noise_of_several_readings_is_noise(cases: Cases) -> None:
     assert (found.outcome, found.doubted) == ("tolerances", "")
 
 
-def test_noise_of_several_readings_that_follows_from_one_motion_is_an_unknown_effect(cases: Cases) -> None:
+@pytest.mark.parametrize("motion", [rattling, kicks])
+def test_noise_of_several_readings_that_follows_from_one_motion_is_an_unknown_effect(
+    cases: Cases, motion: Callable[[int], Array]
+) -> None:
     whole = cases.record()
-    part = lab_b(whole)
-    command = next(iter(part.inputs))
-    rattling = part.inputs[command] + 2e-4 * np.sin(0.4 * np.arange(whole.ticks)) * white(43, whole.ticks)
-    change = part.replaced(inputs=part.inputs | {command: rattling})
-    system = residuals.prepare(part, whole).system
-    more = dict(zip(part.signals, (change.predict(system) - part.predict(system)).T, strict=True))
-    found = judged(
-        replace(whole, signals=whole.signals | {name: whole.signals[name] + x for name, x in more.items()})
-    )
+    found = judged(moved_by(whole, motion(whole.ticks)))
     assert (found.outcome, found.doubted) == ("unknown", "")
     assert where.culprits(found.search.chosen) == ("table",)
+
+
+def test_noise_that_follows_from_one_motion_is_an_unknown_effect_beside_one_with_a_name(cases: Cases) -> None:
+    effect = {"table.gain": {"factor": 1.1}}
+    whole = cases.record(effect)
+    bare = bare_fit(moved_by(whole, rattling(whole.ticks)))
+    chosen = settling.settled(fitting.fit(bare.data, effect, bare.z))
+    found = judge(Search(chosen.data, bare, chosen, ()))
+    assert (found.effects, found.outcome) == (("table.gain",), "partly")
 
 
 def test_noise_that_shakes_a_whole_table_is_none_of_its_accelerometer(cases: Cases) -> None:

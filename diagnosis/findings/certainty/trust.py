@@ -21,6 +21,9 @@ from diagnosis.fits.laws.best import BETTER
 from diagnosis.fits.trade import freedom
 from diagnosis.fits.unexplained import MATERIAL, remaining
 
+# Probability of other values of the plan's own parameters beside which something is left, over that of a mechanism that
+# leaves as much: half, as one unknown cause that they imitate is no less likely than two causes.
+EITHER = 0.5
 LEAST_TRACE = 0.1  # trace over noise below which a smaller one makes no difference: nothing can be seen of it
 SIGNS = ("clear", "names")
 
@@ -57,6 +60,17 @@ def less_by_freedom(probability: float, verdicts: Sequence[PartVerdict]) -> floa
     further = sum(max(parameters - effects, 0) for parameters, effects in counts)
     odds = probability * BETTER**further
     return odds / (odds + 1.0 - probability)
+
+
+def of_the_plan(verdict: PartVerdict) -> bool:
+    """Whether nothing but other values of the plan's own parameters is named, as a mass or a delay.
+
+    What a mechanism leaves its law may leave, which is another one in the laboratory. A value has no law: what is left
+    beside it has another cause.
+    """
+    data, fit = verdict.search.data, verdict.search.chosen
+    moved = [data.catalogue[name].apply(data.system, **values) for name, values in fit.values.items()]
+    return all(system.effects == data.system.effects for system in moved)
 
 
 def share_likeliest(verdict: PartVerdict) -> float:

@@ -11,28 +11,43 @@ from diagnosis.findings.sensors.readings import LEAST
 from diagnosis.findings.sites.likely import APART, REST, ranked
 from diagnosis.fits import fitting, sensor_noise
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.search import Search
+from diagnosis.fits.residuals import Data
+from diagnosis.fits.search import Search, likeliest
+from diagnosis.fits.threads import each
 
 # Noise of a reading at its loudest frequency over that at the highest ones, from which on it is doubted where no other
 # reading of its laboratory has more than QUIET, or all others have so many times less. Pink noise of a test has less
 # than LONE.
 LONE, QUIET = 10.0, 2.0
+AGAIN = 6  # steps of a fit under another noise, from where it was
 
 
-def heard_as_noise(search: Search) -> tuple[Search, str]:
-    """A search without effects, under less noise where coloured noise of readings may hide an unknown effect.
+def under_less_noise(search: Search) -> tuple[Search, str]:
+    """A search whose effects, if any, are held against less noise where coloured noise may hide an unknown effect.
 
-    That is white noise, or for a lone reading the noise that all readings have. With it goes the reading of which that
-    is doubtful, empty where none is: noise that several readings have as they would follow from one motion is that
-    motion.
+    That is white noise where several readings have the noise as they would follow from one motion: it is that motion.
+    For a lone reading it is the noise that all readings have; with it goes the reading of which that is doubtful, empty
+    where there is none or where the effects explain it as well.
     """
-    name = lone_noise(search.chosen)
-    if not name and np.max(sensor_noise.loudest(search.chosen), initial=0.0) < LONE:
+    if not sensor_noise.coloured(search.chosen.data):
         return search, ""
-    white = in_white_noise(search)
-    if moves(white.chosen):
-        return white, ""
-    return (in_common_noise(search), name) if name else (search, "")
+    data, name = sensor_noise.whitened(search.chosen), ""
+    if not moves(fitting.at(data, search.chosen.values, search.chosen.z)):
+        data, name = in_common(search.chosen), lone_noise(search.chosen)
+        if not name:
+            return search, ""
+    return fitted_again(search, data), name
+
+
+def fitted_again(search: Search, data: Data) -> Search:
+    """A search under another noise: all of its fits moved to the best parameters."""
+    if not search.chosen.names:
+        bare = fitting.fit(data, {}, search.chosen.z)
+        return replace(search, data=data, commissioned=bare, chosen=bare)
+    fits = (search.commissioned, search.chosen, *search.alternatives)
+    bare, chosen, *others = each(lambda fit: fitting.fit(data, fit.values, fit.z, AGAIN, rounds=1), fits)
+    others.sort(key=lambda fit: fit.cost)
+    return likeliest(Search(data, bare, chosen, tuple(others)))
 
 
 def moves(fit: Fit) -> bool:
@@ -69,15 +84,3 @@ def expected(fit: Fit, place: int) -> bool:
     over = fit.data.white[planned > 0.0] / planned[planned > 0.0]
     own = fit.data.white[place] / planned[place]
     return bool(own <= max(LEAST, float(np.median(over))))
-
-
-def in_common_noise(search: Search) -> Search:
-    """A search without effects under noise of the colour that all readings have."""
-    bare = fitting.fit(in_common(search.chosen), {}, search.chosen.z)
-    return replace(search, data=bare.data, commissioned=bare, chosen=bare)
-
-
-def in_white_noise(search: Search) -> Search:
-    """A search without effects under white noise of the level of the highest frequencies."""
-    bare = fitting.fit(sensor_noise.whitened(search.chosen), {}, search.chosen.z)
-    return replace(search, data=bare.data, commissioned=bare, chosen=bare)

@@ -144,7 +144,7 @@ def judged(given: Spectra, signature: Signature) -> LikelySite | None:
     lines = np.diff(given.edges)
     series = np.log(np.maximum(said, 1.0)) + np.minimum(said, 1.0)
     remainder = others * np.log(noise) + left / noise
-    cost = float(lines @ (series + remainder) + 0.5 * np.sum((given.z + moved) ** 2))
+    cost = float(lines @ (series + remainder) + 0.5 * np.sum((given.z + moved) ** 2)) + APART * signature.rare
     beyond, whole = (
         float(lines @ np.maximum(item, 0.0)) for item in (left - others, said + left - others - 1.0)
     )

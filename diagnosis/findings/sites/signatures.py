@@ -3,7 +3,8 @@
 A machine's effect changes its motion, and with it every reading downstream; an error of a reading changes that alone.
 Laplace variable s, displacements of the transfer system x, stroke y relative to the table, m·s² and so on of the plan.
 
-Table:    x, s²·x, y = −m·s²·x/(m·s² + c·s + k), force (k + c·s)·y
+Table:    x, s²·x, y = −m·s²·x/(m·s² + c·s + k), force (k + c·s)·y; by what moves or tilts the ground under it all but
+          x, which is measured from there
 Damper:   y, force −m·s²·y by a force within the damper, (k + c·s)·y by what its mass carries along
 Actuator: x, force (m·s² + c·s + k)·x;  column: force alone
 """
@@ -31,6 +32,15 @@ class Signature(NamedTuple):
 
     site: str
     readings: Spectrum  # (frequencies, signals)
+    rare: bool = False  # whether another site that explains as much is the likelier one
+
+
+class Way(NamedTuple):
+    """How the readings of a laboratory follow from one series at a machine."""
+
+    site: str
+    rows: list[Spectrum]  # by signal
+    rare: bool = False
 
 
 def laboratory_of(part: Part) -> LaboratoryPart | None:
@@ -48,11 +58,12 @@ def signatures(part: LaboratoryPart, system: System, frequencies: Array) -> list
     if part.lab.kind.name not in kinds:
         return []
     lab: RecordedLaboratory = part.lab
-    find: Callable[[System, Spectrum], list[tuple[str, list[Spectrum]]]] = kinds[lab.kind.name]
+    find: Callable[[System, Spectrum], list[Way]] = kinds[lab.kind.name]
     s: Spectrum = np.asarray(2j * np.pi * frequencies, dtype=np.complex128)
     recorded = passed(part, frequencies)
     machines = [
-        Signature(lab.site(site), np.stack(rows, axis=1) * recorded) for site, rows in find(system, s)
+        Signature(lab.site(way.site), np.stack(way.rows, axis=1) * recorded, way.rare)
+        for way in find(system, s)
     ]
     one = np.eye(recorded.shape[1])
     sensors = [
@@ -62,25 +73,26 @@ def signatures(part: LaboratoryPart, system: System, frequencies: Array) -> list
     return [*machines, *sensors]
 
 
-def of_table(system: System, s: Spectrum) -> list[tuple[str, list[Spectrum]]]:
+def of_table(system: System, s: Spectrum) -> list[Way]:
     """A damper on a table: displacement and acceleration of the table, stroke and force of the damper."""
     damper, none, one = system.plan.damper, np.zeros_like(s), np.ones_like(s)
     inertia = damper.mass * s**2
     spring = damper.stiffness + damper.damping * s
     moving = inertia + spring
     return [
-        ("table", [moving, s**2 * moving, -inertia, -inertia * spring]),
-        ("damper", [none, none, one, -inertia]),
-        ("damper", [none, none, one, spring]),
+        Way("table", [moving, s**2 * moving, -inertia, -inertia * spring]),
+        Way("table", [none, s**2 * moving, -inertia, -inertia * spring], rare=True),
+        Way("damper", [none, none, one, -inertia]),
+        Way("damper", [none, none, one, spring]),
     ]
 
 
-def of_column(system: System, s: Spectrum) -> list[tuple[str, list[Spectrum]]]:
+def of_column(system: System, s: Spectrum) -> list[Way]:
     """A column under an actuator: displacement and force."""
     column, one = system.plan.column, np.ones_like(s)
     return [
-        ("actuator", [one, column.mass * s**2 + column.damping * s + column.stiffness]),
-        ("column", [0.0 * one, one]),
+        Way("actuator", [one, column.mass * s**2 + column.damping * s + column.stiffness]),
+        Way("column", [0.0 * one, one]),
     ]
 
 
