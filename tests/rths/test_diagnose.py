@@ -17,7 +17,7 @@ from common.recording.run import PEAKS
 from diagnosis.fits.residuals import withheld_ticks
 from diagnosis.recorded import record
 from diagnosis.report.schema import schema
-from tests.diagnosis.cases import Cases, play, short
+from tests.diagnosis.cases import STRONGEST, Cases, play, short
 from tests.helpers import with_table
 
 FRICTION = {"damper.friction": {"force": 3.0}}
@@ -51,7 +51,7 @@ def test_diagnose_writes_report_page_and_summary(
     call: Any, capsys: Any, cases: Cases, tmp_path: Path
 ) -> None:
     out, html = tmp_path / "gap.json", tmp_path / "gap.html"
-    path = cases.file(FRICTION, duration=8.0)
+    path = cases.file(FRICTION, duration=STRONGEST)
     reality = tmp_path / "found.toml"
     assert call("diagnose", path, "--json", out, "--html", html, "--found", reality) == 0
     text, error = capsys.readouterr()
@@ -67,7 +67,7 @@ def test_diagnose_writes_report_page_and_summary(
     assert stated["value"] == written["effect"][0]["force"]  # to the last bit
     assert stated["interval"][0] <= stated["value"] <= stated["interval"][1]
     corrected = tmp_path / "corrected.mcap"
-    assert call("simulate", "default", "--duration", 8, "--reality", reality, "-o", corrected) == 0
+    assert call("simulate", "default", "--duration", STRONGEST, "--reality", reality, "-o", corrected) == 0
     capsys.readouterr()
     assert left(path, corrected) == report["how_far"]["after"]  # to the last bit
     assert call("simulate", "rc_column", "--duration", 1, "--reality", reality) == 2

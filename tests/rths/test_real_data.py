@@ -84,7 +84,7 @@ def test_the_unexplained_part_of_the_force_rigs_gap_is_reported(rig: tuple[Path,
 @pytest.mark.parametrize(
     ("name", "rows"),
     [
-        ("8-D22_bondslip", 3),
+        ("8-D22_bondslip", 4),
         *(
             pytest.param(name, 1, marks=pytest.mark.slow)
             for name in ("4-D22", "8-D22", "4-D22_bondslip", "8-D22_bondslip")
