@@ -17,7 +17,7 @@ RECORDINGS, QUICK_RECORDINGS = 1000, 8
 # Different tests among them. The others are further names of the same files, so that only these take space: a catalogue
 # reads and checks every file under each of its names, but from memory after the first time.
 DIFFERENT, QUICK_DIFFERENT = 10, 2
-DURATION, QUICK_DURATION = 40.0, 2.0  # s of a test
+DURATION, QUICK_DURATION = 40.0, 0.5  # s of a test
 MOST = 20.0  # s to catalogue them
 MOST_QUERY = 0.2  # s of a question: below that a command is felt to answer at once
 REPEATS, QUESTIONS = 3, 9  # odd, so that the median is a measured value
