@@ -31,7 +31,7 @@ from laboratories.completeness import KERNEL
 from laboratories.device import Device, DeviceRecord, advance_device
 from laboratories.kind import Kind
 from laboratories.table.kind import TABLE
-from laboratories.table.model import TableLab
+from laboratories.table.record import TableLab
 from models.compiled import MERGED
 from models.registry import Array
 from models.system import System

@@ -24,7 +24,7 @@ from laboratories.kind import Kind
 from laboratories.kinds import kinds_of
 from laboratories.sensors import noise
 from laboratories.table.kind import TABLE
-from laboratories.table.model import TableLab
+from laboratories.table.record import TableLab
 from loop import assembly, site, substructure
 from loop.site import Site
 from loop.substructure import (

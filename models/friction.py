@@ -17,15 +17,18 @@ import numpy as np
 from models.compiled import jit
 
 COULOMB = 1e-6  # m/s; with v₀ up to this value the force does not decrease at low speed: Coulomb friction
+# Ratios of speeds from which on 1 − tanh and exp are below what a number holds beside 1: neither needs to be computed.
+TANH_IS_ONE, EXP_IS_NOTHING = 20.0, 40.0
 
 
 @jit
 def left(rate: float, velocity: float, drop: float, speed: float) -> float:
     """The factor on a friction force at a rate (m/s): v₀ = `velocity` and v_s = `speed` in m/s, d = `drop`."""
     size = abs(rate)
-    share = 1.0 if velocity <= COULOMB else np.tanh(size / velocity)
+    share = 1.0 if velocity <= COULOMB or size > TANH_IS_ONE * velocity else np.tanh(size / velocity)
     if drop != 0.0:
-        share *= 1.0 - drop * (1.0 - np.exp(-size / speed))
+        beyond = 0.0 if size > EXP_IS_NOTHING * speed else np.exp(-size / speed)
+        share *= 1.0 - drop * (1.0 - beyond)
     return float(share)
 
 

@@ -11,6 +11,7 @@ from common.plan.laboratory_tables import Damper, ShakingTable
 from laboratories.identification import checks, estimate
 from laboratories.identification.estimate import Identified
 from laboratories.table import model as table_lab
+from laboratories.table.record import TableLab
 from models.compiled import jit
 from models.registry import Array
 
@@ -42,7 +43,7 @@ class Bandwidth(NamedTuple):
 
 
 @jit
-def respond(lab: table_lab.TableLab, command: Array, result: Array) -> None:
+def respond(lab: TableLab, command: Array, result: Array) -> None:
     """Table displacement at each tick from rest; the command written at tick k acts from there on."""
     result[0] = 0.0
     for k in range(command.size - 1):

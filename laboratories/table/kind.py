@@ -24,7 +24,7 @@ from laboratories.kind import (
 )
 from laboratories.table import linear, model
 from laboratories.table.descent import TableRamp
-from laboratories.table.model import TableLab
+from laboratories.table.record import TableLab
 from models.compiled import bound
 from models.registry import Array
 from models.system import System
