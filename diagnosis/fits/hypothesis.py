@@ -21,7 +21,7 @@ OF_SIZE = 0.1  # of such a step, in the distance of an effect's parameter from i
 # steps of 4 % ended twenty times as far from it (set "normal", seed 8101).
 OF_LOGARITHM = 0.025
 KEPT = 3  # residuals of the last places that are kept: a fit asks for those of a step and of the one before it again
-REUSED = 3  # iterations for which the slopes over the nominal parameters serve again
+RENEWED = 3  # steps after which slopes over the effects' parameters are computed anew
 
 Values = dict[str, dict[str, float]]  # effect → parameter → value
 
@@ -94,8 +94,7 @@ def free(effect: Effect, values: Mapping[str, float]) -> list[Free]:
 class Problem:
     """One hypothesis as `least_squares` takes it.
 
-    `slopes` of the residuals over the nominal parameters, known from elsewhere, serve as long as
-    the fit goes on; without them they are computed anew every few iterations.
+    `slopes` are those of the residuals over the nominal parameters where they are known from elsewhere.
     """
 
     def __init__(
@@ -111,8 +110,9 @@ class Problem:
         self.count = len(data.part.nuisances)
         self._step = FINE_STEP if data.part.exact else STEP
         self._slopes = slopes
-        self._uses = 0 if slopes is None else -1
         self._kept: dict[bytes, Array] = {}
+        self._last: tuple[Array, Array] | None = None
+        self._turn = 0
 
     def place(self, values: Values, z: Array) -> Array:
         """What the fit moves, from the parameters."""
@@ -182,11 +182,34 @@ class Problem:
         return OF_SIZE * max(1.0, abs(value))
 
     def stacked_jacobian(self, p: Array) -> Array:
-        """Derivative of `stacked`."""
+        """Derivative of `stacked`.
+
+        It is computed at the first place. At others it follows from how the residuals changed over the last step, and
+        every few steps what belongs to the effects is computed anew.
+        """
         here = self.reduced(p).ravel()
-        if self._slopes is None or self._uses == 0:
-            self._slopes, self._uses = self.jacobian(p, here, last=self.count), REUSED
-        self._uses -= 1
-        slopes = np.concatenate([self._slopes, self.jacobian(p, here, first=self.count)], axis=1)
-        fitted = (slopes[self._train].T * self._weights).T
+        if self._slopes is None:
+            self._slopes = self.jacobian(p, here, last=self.count)
+        elif self._last is not None:
+            self._slopes = secant(*self._last, p, here, self._slopes)
+        if self._turn == 0:
+            anew = self.jacobian(p, here, first=self.count)
+            self._slopes = np.concatenate([self._slopes[:, : self.count], anew], axis=1)
+        self._turn = (self._turn + 1) % RENEWED
+        self._last = p.copy(), here
+        fitted = (self._slopes[self._train].T * self._weights).T
         return np.concatenate([fitted, np.eye(self.count, p.size)])
+
+
+def secant(before: Array, old: Array, p: Array, new: Array, slopes: Array) -> Array:
+    """Slopes (residuals, parameters) changed as little as the residuals after a step demand.
+
+    `old` (residuals,) are the residuals at the place `before` (parameters,), `new` those at `p`. Each parameter counts
+    by how far it changes the residuals (C. G. Broyden, Mathematics of Computation 19 (1965), 577-593, eq. 4.5, scaled).
+    """
+    step = p - before
+    along = step * np.sum(np.square(slopes), axis=0)
+    total = float(step @ along)
+    if total == 0.0:
+        return slopes
+    return np.asarray(slopes + np.outer(new - old - slopes @ step, along / total))

@@ -17,6 +17,7 @@ from common.plan.plan import Plan
 from common.recording.reader import read
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import secant
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded import record
 from diagnosis.recorded.nuisances import of_building
@@ -262,3 +263,13 @@ def test_a_gap_on_one_side_of_what_a_fit_sees_is_told(
     assert not fitting.one_sided(whole)
     assert whole.chi == pytest.approx(float(np.sum(noise**2)))
     assert fit.chi == pytest.approx((1.0 + judging) * noise.size)
+
+
+def test_slopes_follow_the_residuals_of_a_step() -> None:
+    random = np.random.default_rng(4)
+    slopes, before = random.normal(size=(30, 3)), random.normal(size=3)
+    p, old, new = before + np.array([0.5, 0.0, -0.2]), random.normal(size=30), random.normal(size=30)
+    found = secant(before, old, p, new, slopes)
+    assert found @ (p - before) == pytest.approx(new - old)
+    assert np.array_equal(found[:, 1], slopes[:, 1])  # of a parameter that did not move
+    assert secant(before, old, before, new, slopes) is slopes
