@@ -34,11 +34,16 @@ class Scales:
         self._usual: dict[tuple[str, str], float] = {}
         self._typical: dict[tuple[str, str], float] = {}
         self._of_site: dict[str, tuple[str, ...]] = {}  # signals that tell how large a site's effects may be
+        self._curves: dict[
+            str, tuple[str, ...]
+        ] = {}  # by site: what a machine is given, and what it makes of it
         for lab in record.labs:
             self._usual |= {(lab.signal(name), unit): size for (name, unit), size in lab.kind.reaches.items()}
             readings = readings_of(lab.kind, lab.plan).items()
             self._typical |= {(lab.signal(name), one.unit): one.typical for name, one in readings}
             self._of_site |= sized(lab)
+            for machine in lab.kind.machines(lab.plan):
+                self._curves[lab.site(machine.site)] = tuple(map(lab.signal, machine.curve))
 
     def peak(self, signal: str) -> float:
         """Largest magnitude of a recorded signal, 0 where it was not recorded."""
@@ -119,11 +124,18 @@ class Scales:
         return [min(max(size, parameter.least), parameter.most) for size in sizes]
 
     def swallowing(self, effect: Effect, parameter: Parameter) -> list[float]:
-        """Widths of a play that take a large part of the motion, none where the parameter is no such width."""
+        """Widths of a play that take a large part of the motion, none where the parameter is no such width.
+
+        One is the width that takes all that a motion lacks of its command.
+        """
         reached = self.reached(self.signal(effect, parameter.unit), parameter.unit)
         if not parameter.swallows or not reached:
             return []
-        return [min(share * reached, parameter.most) for share in SWALLOWED]
+        found = [share * reached for share in SWALLOWED]
+        given, made = self._curves[effect.site]
+        if self._record.has(given) and self._record.unit(given) == self._record.unit(made):
+            found.append(max(2.0 * (self.peak(given) - self.peak(made)), found[-1]))
+        return [min(size, parameter.most) for size in sorted(set(found))]
 
     def resting(self, effect: Effect) -> Iterator[dict[str, float]]:
         """Parameters of a play inside which a part rests, under laws whose shape says what moves it there."""
