@@ -241,13 +241,15 @@ def in_front(search: Search, stands: Fit) -> Search:
 def plainest(search: Search) -> Search:
     """The search with that one in front of as many effects that the data cannot tell from the chosen ones.
 
-    A machine's effect stands before a sensor's, then the one with the fewest free parameters, then the likeliest.
+    A machine's effect stands before a sensor's, then the one with the fewest free parameters, then the likeliest, where
+    one of several laws is as likely as any other of its effect.
     """
     catalogue, chosen = search.data.catalogue, search.chosen
 
     def order(fit: Fit) -> tuple[int, int, float]:
         artefacts = sum(catalogue[name].kind == "measurement" for name in fit.names)
-        return artefacts, trade.freedom(fit)[0], fit.cost
+        laws = sum(math.log(max(1, len(catalogue[name].laws))) for name in fit.names)
+        return artefacts, trade.freedom(fit)[0], fit.cost + 2.0 * laws
 
     same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
     return in_front(search, min([chosen, *(item for item in same if tied(chosen, item))], key=order))
