@@ -16,9 +16,10 @@ from common.terminal.telling import Tell, untold
 from diagnosis.findings import logger, report, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors import readings, staircases
+from diagnosis.findings.sensors.loud_noise import no_noise
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.sensors.staircases import Stairs
-from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, shaken, sharpest
+from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
@@ -158,12 +159,12 @@ def noise(verdicts: Sequence[PartVerdict], of: Callable[[Search], Array]) -> dic
 def machines_first(
     record: Record, verdicts: Sequence[PartVerdict], noisy: Sequence[SensorFinding]
 ) -> tuple[list[PartVerdict], list[SensorFinding]]:
-    """The verdicts and the noise found on sensors, where noise that follows from a machine's motion is none."""
+    """The verdicts and the noise found on sensors, where noise that a machine's motion or an effect makes is none."""
     signal = {item: record.catalogue[item.effect].signal for item in noisy if item.parameter == "rms"}
     usual = {name: item.usual for item, name in signal.items()}
     result, none = [], set[str]()
     for verdict in verdicts:
-        moved = shaken(verdict, usual)
+        moved = no_noise(verdict, usual, Scales(record))
         none |= set(verdict.search.data.part.signals if moved else ())
         result.append(moved or verdict)
     return result, [item for item in noisy if signal.get(item) not in none]

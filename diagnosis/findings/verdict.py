@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from diagnosis.findings.sensors.own_reading import machine_alone
-from diagnosis.findings.sensors.slow_noise import moves, under_less_noise
+from diagnosis.findings.sensors.slow_noise import under_less_noise
 from diagnosis.findings.sites.likely import APART, REST, ranked
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit, at_end
@@ -144,26 +143,6 @@ def unnamed(search: Search) -> PartVerdict:
     bare = replace(search, chosen=search.commissioned)
     return PartVerdict(
         bare, "unknown", DOUBT["unknown"], tuple(zip(near, map(float, chances), strict=True)), ()
-    )
-
-
-def shaken(verdict: PartVerdict, usual: Mapping[str, float]) -> PartVerdict | None:
-    """The verdict where what looks like loud noise of readings follows from a machine's motion, else None.
-
-    `usual` is the rms noise that such readings have otherwise, by signal. Steps of a command shake a machine like noise
-    does, and all readings show it; the noise of a sensor shows in its own reading alone.
-    """
-    search, signals = verdict.search, verdict.search.data.part.signals
-    if verdict.effects or verdict.joined or not usual.keys() & set(signals):
-        return None
-    white = sensor_noise.whitened(search.chosen)
-    most = np.array([usual.get(name, math.inf) for name in signals])
-    data = residuals.measured_by(white, np.minimum(white.white, most))
-    bare = fitting.fit(data, {}, search.chosen.z)
-    if not moves(bare):
-        return None
-    return PartVerdict(
-        replace(search, data=data, commissioned=bare, chosen=bare), "unknown", 1.0, verdict.others, ()
     )
 
 

@@ -227,6 +227,13 @@ def over_longer(data: Data, building: LoggedBuilding) -> Data | None:
     return replace(data, group=wider, train=train)
 
 
+def by_tick(data: Data) -> Data:
+    """The residuals of a part without averages, for what changes from tick to tick."""
+    train = np.repeat(data.train, data.group)
+    rest = np.full(len(data.part.measured) - train.size, train[-1])
+    return replace(data, group=1, train=np.concatenate([train, rest]))
+
+
 def withheld_ticks(ticks: int, interval: float) -> Mask:
     """Ticks (ticks,) that no fit sees."""
     group, train = withheld(ticks, interval)

@@ -332,6 +332,21 @@ def test_noise_that_shakes_a_whole_table_is_none_of_its_accelerometer(cases: Cas
     assert [item.effect for item in noisy.readings] == ["sensor.table_acceleration.noise"]
 
 
+def test_an_inertia_that_a_restless_command_hides_in_noise_is_found(cases: Cases) -> None:
+    whole = cases.record(scale=0.02, duration=4.0)
+    part = lab_a(whole)
+    (command,) = part.inputs
+    restless = part.inputs[command] + 3e-5 * white(53, whole.ticks)
+    system = residuals.prepare(part, whole).system
+    heavy = whole.catalogue["column.inertia"].apply(system, mass=1000.0)
+    moved = part.replaced(inputs=part.inputs | {command: restless}).predict(heavy) - part.predict(system)
+    felt = {name: whole.signals[name] + x for name, x in zip(part.signals, moved.T, strict=True)}
+    found = examine(replace(whole, signals=whole.signals | felt | {command: restless}))
+    verdict = next(item for item in found.verdicts if item.search.data.part.name == part.name)
+    assert (verdict.outcome, found.readings) == ("explained", [])
+    assert verdict.search.chosen.values["column.inertia"]["mass"] == pytest.approx(1000.0, rel=0.05)
+
+
 def test_a_gap_that_a_nominal_parameter_took_upon_itself_lies_at_its_machine(cases: Cases) -> None:
     whole = cases.record()
     data = residuals.prepare(lab_a(whole), whole)

@@ -9,9 +9,8 @@ import pytest
 
 from common.plan.laboratory_tables import Damper, ShakingTable
 from laboratories.table import model, segments
-from models.registry import Array
 from models.system import DamperEffects, TableEffects
-from tests.laboratories.effects.histories import DT, STROKE, Y, run_b, tones
+from tests.laboratories.effects.histories import DT, STROKE, Array, Y, run_b, tones
 
 TICKS = 1500
 CASES: dict[str, dict[str, Any]] = {
