@@ -50,7 +50,6 @@ from laboratories.table.record import (
 from laboratories.table.steady import steady
 from models import preisach
 from models.compiled import jit
-from models.registry import Array
 from models.saturation import saturated
 from models.system import DamperEffects, TableEffects
 from models.transfer_systems import delay
@@ -79,11 +78,7 @@ def build(
     damper = replace(damper, mass=damper.mass - behind_coupling[0])
     numbers = segments.levels(interval, on_table, on_damper)
     taps, memory, lengths, walk = segments.divided(interval, table.delay, numbers)
-    alike: dict[float, Array] = {}  # equal steps differ by rounding only
-    for length in lengths:
-        if (key := round(float(length), 12)) not in alike:
-            alike[key] = propagation(float(length), table, damper, on_table)
-    rows = np.stack([alike[round(float(length), 12)] for length in lengths])
+    rows = np.stack([propagation(float(length), table, damper, on_table) for length in lengths])
     size = rows.shape[1]
     columns = np.zeros((len(rows), size + INPUTS, ROWS))
     columns[:, :, :size] = rows.transpose(0, 2, 1)
@@ -185,7 +180,7 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
 
 @jit
 def walk_on(lab: TableLab, border: int) -> tuple[int, int]:
-    """The longest segment from a border on over which forces are steady, its place, and where it ends.
+    """The longest segment from a border on over which forces are steady: the place of its length, and where it ends.
 
     Its inputs, and the states at its end without forces, are in `state` and `free` then.
     """

@@ -39,11 +39,11 @@ class TableLab(NamedTuple):
     """The state and constants of the laboratory, which `advance` updates by one interval."""
 
     taps: Array  # of the delayed command, at the shortest segments' borders
-    # (levels, borders, 2): from a border on, by length, the segment that begins there, -1 for none, and where it ends
+    # (levels, borders, 2): from a border on, by level, the place of the segment's length, -1 for none, and its end
     walk: Whole
     # (m, n + 5, ROWS): what state, command before and after, motor command, g and table friction add to the next state
     columns: Array
-    lengths: Array  # of the segments, s
+    lengths: Array  # (m,) of segments, s
     spring: Array  # (stiffness N/m, dashpot N·s/m) of the damper
     limits: Array  # effects that are not in the matrices
     history: Array  # table commands written, newest first

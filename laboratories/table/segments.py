@@ -7,6 +7,7 @@ slides one way. Where they are not, as at a reversal, `advance` goes on by short
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +23,7 @@ from models.transfer_systems import delay
 # Shortest segments of dry friction in a usual one: its jump at a reversal is met to 0.06 ms at an interval of 2 ms, and
 # the stroke of the damper errs by a fifth of what it does with usual ones.
 JUMPS = 4
+KEPT = 64  # divisions of an interval
 
 
 def levels(interval: float, table: TableEffects, damper: DamperEffects) -> tuple[int, ...]:
@@ -43,26 +45,30 @@ def dry(part: TableEffects | DamperEffects) -> bool:
     return part.friction_velocity <= COULOMB and part.friction_drop == 0.0
 
 
+@lru_cache(maxsize=KEPT)
 def divided(interval: float, dead: float, numbers: tuple[int, ...]) -> tuple[Array, int, Array, Whole]:
     """The segments of an interval (s) divided into each of some numbers, with the kink of a dead time (s) among them.
+
+    They are kept, since most hypotheses of a diagnosis have the same ones, and must not be written to.
 
     Returns:
         Taps of the delayed command at the borders of the shortest segments, as `delay.split` gives them.
         Length of the history of commands.
-        Lengths of all segments, s.
-        (levels, borders, 2): from a border on, by level, which segment begins there, −1 for none, and where it ends.
+        The different lengths of segments, s.
+        (levels, borders, 2): from a border on, by level, the place of the segment's length, −1 for none, and its end.
     """
     levels = [delay.split(interval, dead, number) for number in numbers]
+    whole = np.concatenate([segments.lengths for segments in levels])
+    # equal ones differ by rounding only
+    _, first, kinds = np.unique(np.round(whole, 12), return_index=True, return_inverse=True)
     shortest = borders(levels[-1])
     walk = np.full((len(numbers), len(shortest) - 1, 2), -1)
-    count = 0
+    kind = iter(kinds.tolist())
     for level, segments in enumerate(levels):
         places = [int(np.argmin(np.abs(shortest - border))) for border in borders(segments)]
         for begin, end in pairwise(places):
-            walk[level, begin] = count, end
-            count += 1
-    lengths = np.concatenate([segments.lengths for segments in levels])
-    return levels[-1].taps, levels[-1].memory, lengths, walk
+            walk[level, begin] = next(kind), end
+    return levels[-1].taps, levels[-1].memory, whole[first], walk
 
 
 def borders(segments: delay.DelaySegments) -> Array:
