@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from common.plan.plan import Plan
 from common.reality import reality
 from common.recording.reader import read
 from common.terminal import cli
+from diagnosis.fits import residuals
 from diagnosis.recorded import record
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
@@ -150,3 +152,15 @@ def away(effect: str, parameter: str, value: float) -> float:
 def white(seed: int, *shape: int) -> Array:
     """White noise of rms one."""
     return np.random.default_rng(seed).standard_normal(shape)
+
+
+def moved_by(whole: Record, more: Array) -> Record:
+    """The record of a slave whose table makes `more` motion (ticks,) in m than its command says."""
+    part = lab_b(whole)
+    command = next(iter(part.inputs))
+    change = part.replaced(inputs=part.inputs | {command: part.inputs[command] + more})
+    system = residuals.prepare(part, whole).system
+    shown = dict(zip(part.signals, (change.predict(system) - part.predict(system)).T, strict=True))
+    return replace(
+        whole, signals=whole.signals | {name: whole.signals[name] + x for name, x in shown.items()}
+    )

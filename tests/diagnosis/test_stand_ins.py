@@ -26,7 +26,7 @@ from diagnosis.report.records import PartOfGap
 from diagnosis.signals.noise_model import Source
 from models.registry import Array
 from report.gap import wording
-from tests.diagnosis.cases import STRONGEST, Cases, lab_a, lab_b, white
+from tests.diagnosis.cases import STRONGEST, Cases, lab_a, lab_b, moved_by, white
 from tests.diagnosis.test_equivalents import DATA, NOISY
 
 GAP = np.sin(0.2 * np.arange(DATA.groups))[:, None]
@@ -34,7 +34,6 @@ MORE, AR1 = (
     3.0,
     np.sqrt(1.0 - 0.95**2),
 )  # times a sensor's noise; what makes noise of this correlation one of rms one
-STEP = 4e-5  # m, of the converter that gives a table its command
 SHAKEN = 1e-5  # m, of a table: the noise of its displacement sensor
 RESONANCE, WANDER = 0.3, 3e-5  # Hz, of the default damper; m, fifteen times the noise of its stroke's sensor
 
@@ -239,18 +238,6 @@ def test_slow_noise_far_louder_than_that_of_all_other_readings_may_be_an_unknown
     assert judged(alike).doubted == ""
 
 
-def moved_by(whole: Record, more: Array) -> Record:
-    """The record of a slave whose table makes `more` motion (ticks,) in m than its command says."""
-    part = lab_b(whole)
-    command = next(iter(part.inputs))
-    change = part.replaced(inputs=part.inputs | {command: part.inputs[command] + more})
-    system = residuals.prepare(part, whole).system
-    shown = dict(zip(part.signals, (change.predict(system) - part.predict(system)).T, strict=True))
-    return replace(
-        whole, signals=whole.signals | {name: whole.signals[name] + x for name, x in shown.items()}
-    )
-
-
 def moved_table(whole: Record) -> Record:
     """The record of a slave whose table moves slowly beside its command."""
     return moved_by(whole, SHAKEN * signal.lfilter([AR1], [1.0, -0.95], white(43, whole.ticks)))
@@ -309,42 +296,6 @@ def test_noise_that_follows_from_one_motion_is_an_unknown_effect_beside_one_with
     chosen = settling.settled(fitting.fit(bare.data, effect, bare.z))
     found = judge(Search(chosen.data, bare, chosen, ()))
     assert (found.effects, found.outcome) == (("table.gain",), "partly")
-
-
-def test_noise_that_shakes_a_whole_table_is_none_of_its_accelerometer(cases: Cases) -> None:
-    whole = cases.record()
-    part = lab_b(whole)
-    command = next(iter(part.inputs))
-    coarse = STEP * np.round(part.inputs[command] / STEP)
-    change = part.replaced(inputs=part.inputs | {command: coarse})
-    system = residuals.prepare(part, whole).system
-    more = dict(zip(part.signals, (change.predict(system) - part.predict(system)).T, strict=True))
-    felt = {"table_acceleration": np.std(more["table_acceleration"]) * white(47, whole.ticks)}
-    shaken, noisy = (
-        examine(
-            replace(whole, signals=whole.signals | {name: whole.signals[name] + x for name, x in one.items()})
-        )
-        for one in (more, felt)
-    )
-    verdict = next(item for item in shaken.verdicts if item.search.data.part.name == part.name)
-    assert (verdict.outcome, shaken.readings) == ("unknown", [])
-    assert where.culprits(verdict.search.chosen)[0] == "table"
-    assert [item.effect for item in noisy.readings] == ["sensor.table_acceleration.noise"]
-
-
-def test_an_inertia_that_a_restless_command_hides_in_noise_is_found(cases: Cases) -> None:
-    whole = cases.record(scale=0.02, duration=4.0)
-    part = lab_a(whole)
-    (command,) = part.inputs
-    restless = part.inputs[command] + 3e-5 * white(53, whole.ticks)
-    system = residuals.prepare(part, whole).system
-    heavy = whole.catalogue["column.inertia"].apply(system, mass=1000.0)
-    moved = part.replaced(inputs=part.inputs | {command: restless}).predict(heavy) - part.predict(system)
-    felt = {name: whole.signals[name] + x for name, x in zip(part.signals, moved.T, strict=True)}
-    found = examine(replace(whole, signals=whole.signals | felt | {command: restless}))
-    verdict = next(item for item in found.verdicts if item.search.data.part.name == part.name)
-    assert (verdict.outcome, found.readings) == ("explained", [])
-    assert verdict.search.chosen.values["column.inertia"]["mass"] == pytest.approx(1000.0, rel=0.05)
 
 
 def test_a_gap_that_a_nominal_parameter_took_upon_itself_lies_at_its_machine(cases: Cases) -> None:
