@@ -19,7 +19,7 @@ from diagnosis.findings.sensors import readings, staircases
 from diagnosis.findings.sensors.loud_noise import no_noise
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.sensors.staircases import Stairs
-from diagnosis.findings.verdict import PartVerdict, heard, judge, seen_in, sharpest
+from diagnosis.findings.verdict import UNNAMED, WITHOUT_GAP, PartVerdict, heard, judge, seen_in, sharpest
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
@@ -38,8 +38,6 @@ from models.system import System
 
 # s. A shorter recording is not judged: it holds less than one period of the default building's first mode (2 Hz).
 SHORTEST = 0.5
-WITHOUT_GAP = ("none", "tolerances")  # outcomes of a part that leave nothing to explain
-UNNAMED = ("partly", "unknown")  # outcomes of a part in which some of the gap has no named cause
 # Ratio of the noise in a balance of forces to that of the forces used, from which on a logger caused it.
 # A wrong mass gives a smaller ratio.
 OTHERS = 0.7
@@ -110,10 +108,10 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     steps = readings.resolutions(record, rounded) | logger.interpolated(parts)
     datas, verdicts = [], []
     hidden: dict[str, Stairs] = {}
-    # s, delay that a logger added to all channels, and to the forces of a building; None without a logger.
-    late = None if record.stated is None else logger.common_delay(parts, record, steps)
+    # s, delay that a logger added to all channels, and its standard deviation; None without a logger.
+    late = None if record.stated is None else (logger.common_delay(parts, record, steps), 0.0)
     for number, given in enumerate(parts, 1):
-        part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
+        part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(*late)
         tell(part.name, number, len(parts))
         data, verdict = seen(part, further, record, steps)
         if anew := staircases.hidden(verdict.search, record):
@@ -121,9 +119,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
             data, verdict = seen(part, further, record, steps)
         datas.append(data)
         verdicts.append(verdict)
-        found = verdicts[-1].search
-        if isinstance(found.data.part, LoggedBuilding):
-            late = found.data.part.late(found.chosen.z)
+        late = late and (logger.by_building(verdict) or late)
     held = readings.held(record, steps)
     noisy = readings.findings(record, noise(verdicts, sharpest), rounded, steps, logged=late is not None)
     verdicts, noisy = machines_first(record, verdicts, noisy)

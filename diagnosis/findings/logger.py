@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from diagnosis.findings.certainty.intervals import FOREIGN, covariance
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors import readings
+from diagnosis.findings.verdict import UNNAMED, PartVerdict
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
+from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.parts import ALIKE, LATE, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from diagnosis.signals import clock
@@ -48,6 +51,19 @@ def common_delay(parts: Sequence[Part], record: Record, steps: Mapping[str, floa
     return max(0.0, min(found, default=0.0))
 
 
+def by_building(verdict: PartVerdict) -> tuple[float, float] | None:
+    """Delay (s) and its standard deviation of a logger by the forces of a building; None where it tells nothing.
+
+    A building tells the delay apart from that of any machine, but only as surely as its own formula is right, and
+    nothing where its gap has no cause. No other part tells it.
+    """
+    fit = verdict.search.chosen
+    part = fit.data.part
+    if not isinstance(part, LoggedBuilding) or verdict.outcome in UNNAMED:
+        return None
+    return part.late(fit.z, FOREIGN * np.sqrt(np.diag(covariance(fit))[: fit.z.size]))
+
+
 def clocked(record: Record) -> Record:
     """An imported record with its readings on the clock of the commands.
 
@@ -66,7 +82,7 @@ def nominal(
     parts: Sequence[Part], record: Record, steps: Mapping[str, float]
 ) -> list[tuple[LaboratoryPart, Fit]]:
     """Laboratories behind a logger of any delay, each with the fit of its nominal model."""
-    labs = [part.logged(0.0, LATE) for part in parts if isinstance(part, LaboratoryPart)]
+    labs = [part.logged(0.0, spread=LATE) for part in parts if isinstance(part, LaboratoryPart)]
     return [(lab, fitting.fit(residuals.prepare(lab, record, steps), {})) for lab in labs]
 
 

@@ -42,6 +42,8 @@ NEARLY = 0.99
 FALSE = 0.06
 # Distance from the bound, in tolerances, within which a nominal parameter counts as pinned to it.
 PINNED = 1e-3
+WITHOUT_GAP: tuple[Outcome, ...] = ("none", "tolerances")  # that leave nothing to explain
+UNNAMED: tuple[Outcome, ...] = ("partly", "unknown")  # in which some of the gap has no named cause
 
 
 @dataclass(frozen=True)

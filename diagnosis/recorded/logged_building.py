@@ -127,11 +127,12 @@ class LoggedBuilding(Building):
         """The step of the balance where the force is rounded to one of `steps`, by signal."""
         return {BALANCE: self._scale * steps[self._force]} if self._force in steps else {}
 
-    def late(self, z: Array) -> float:
-        """Delay (s) of the logger that recorded the force, at values z (nuisances,) of a fit."""
-        rows = zip(self.nuisances, z, strict=True)
-        return sum(
-            one.about + float(x) * one.tolerance
-            for one, x in rows
-            if isinstance(one, LoggedForce) and one.parameter == "delay"
-        )
+    def late(self, z: Array, sure: Array) -> tuple[float, float] | None:
+        """Delay (s) of the logger that recorded the force and its standard deviation; None without such a force.
+
+        `z` and `sure` (nuisances,) are the values of a fit and their standard deviations, in tolerances.
+        """
+        for one, value, by in zip(self.nuisances, z, sure, strict=True):
+            if isinstance(one, LoggedForce) and one.parameter == "delay":
+                return one.about + float(value) * one.tolerance, float(by) * one.tolerance
+        return None

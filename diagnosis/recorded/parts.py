@@ -7,6 +7,7 @@ readings by the sensors' noise alone, and a gap in one part does not enter anoth
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Collection
 from typing import Any, Protocol
 
@@ -264,8 +265,8 @@ class LaboratoryPart:
             result.anew = self.anew[(self.anew[:, 0] < ticks - 2 * REACH) | (self.anew[:, 0] == 0)]
         return result
 
-    def logged(self, delay: float, spread: float | None = None) -> LaboratoryPart:
-        """The same laboratory with readings from a logger that delayed other channels by `delay` s.
+    def logged(self, delay: float, unsure: float = 0.0, spread: float | None = None) -> LaboratoryPart:
+        """The same laboratory with readings from a logger that delayed other channels by `delay` ± `unsure` s.
 
         What a logger does to one channel it mostly does to all, to forces as to the others, which have amplifiers of
         their own; `spread` is the standard deviation of their delays, s. Where a delay, a filter or a calibration is
@@ -274,7 +275,7 @@ class LaboratoryPart:
         names, about = self.lab.kind.channels.names, max(0.0, delay)
         late: tuple[LoggedReadings, ...] = ()
         if not any(channel.filter is not None or channel.delay != 0.0 for channel in self.channels):
-            tolerance = spread or max(ALIKE, UNLIKE * about)
+            tolerance = spread or math.hypot(max(ALIKE, UNLIKE * about), unsure)
             rows = self.lab.kind.channels.measured
             late = tuple(
                 LoggedReadings("delay", tolerance, self.lab, those, about)

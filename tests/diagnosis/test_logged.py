@@ -17,6 +17,7 @@ from common.roles import MASTER
 from diagnosis.diagnose import judged, own_noise, still
 from diagnosis.findings import gaps, how_far, report, verdict
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.logger import by_building
 from diagnosis.fits import fitting, residuals, settling, worth
 from diagnosis.fits.residuals import over_longer
 from diagnosis.fits.scales import Scales
@@ -69,9 +70,26 @@ def test_forces_with_extra_noise_are_recognized_as_logged(cases: Cases) -> None:
 def test_a_loggers_delay_is_found_and_its_noise_is_not_a_gap(cases: Cases, colour: float) -> None:
     found = search(logged(noisy(cases.record(), colour)), Scales(cases.record()))
     assert found.chosen.names == ()
-    assert isinstance(found.data.part, LoggedBuilding)
-    assert found.data.part.late(found.chosen.z) == pytest.approx(LATE * 0.002, abs=1e-3)
+    told = by_building(verdict.judge(found))
+    assert told is not None
+    assert told[0] == pytest.approx(LATE * 0.002, abs=1e-3)
+    assert told[0] == pytest.approx(LATE * 0.002, abs=2.0 * told[1])
     assert found.chosen.prior < 9.0  # neither gain nor delay makes the noise smaller, so none is pulled away
+
+
+def test_a_building_without_a_cause_says_nothing_of_its_logger(cases: Cases) -> None:
+    data = logged(noisy(cases.record()))
+    found = verdict.judge(Search(data, fit := fitting.fit(data, {}), fit, ()))
+    assert by_building(found) is not None
+    assert by_building(replace(found, outcome="unknown")) is None
+
+
+def test_readings_without_a_delay_cost_little_where_a_building_hardly_tells_one(cases: Cases) -> None:
+    part = lab_a(whole := cases.record())
+    surely, hardly = (
+        fitting.fit(residuals.prepare(part.logged(1e-3, unsure), whole), {}).prior for unsure in (0.0, 6e-4)
+    )
+    assert hardly < 0.6 * surely  # (0.5 ms)² of 0.25 + 0.36, of which the actuator's own delay bears a part
 
 
 def test_delaying_a_reading_keeps_its_noise_level() -> None:
