@@ -61,16 +61,38 @@ class RecordingGaps:
         known = {name for verdict in self.found.verdicts for name in verdict.search.data.part.signals}
         return self.loop is not None or any(known & set(part.signals) for part in self._parts)
 
-    def signals(self, sites: frozenset[str] | None) -> Mapping[str, Array] | None:
-        """Simulated response with the effects of some sites, of all where None."""
-        linked = sites is None or "link" in sites
-        return self.simulated(self.found.systems(sites, self.record.plans), linked=linked)
+    def signals(
+        self, sites: frozenset[str] | None, left: Mapping[str, Array] | None = None
+    ) -> Mapping[str, Array] | None:
+        """Simulated response with the effects of some sites, of all where None.
 
-    def simulated(self, systems: Mapping[str, System], *, linked: bool = True) -> Mapping[str, Array] | None:
-        """Simulated response of systems behind the logger, with the exchange that was found where `linked`."""
+        To its readings is added what no effect explains of them and is `left` (ticks,), by signal.
+        """
+        linked = sites is None or "link" in sites
+        return self.simulated(self.found.systems(sites, self.record.plans), linked=linked, left=left)
+
+    def simulated(
+        self, systems: Mapping[str, System], *, linked: bool = True, left: Mapping[str, Array] | None = None
+    ) -> Mapping[str, Array] | None:
+        """Simulated response of systems behind the logger, with the exchange that was found where `linked`.
+
+        What is `left` of readings goes round the loop.
+        """
+        more = left or {}
         if self.loop is not None:
-            return self.logged(self.loop.simulate(systems, linked=linked and bool(self.found.link)))
-        return self.logged(self.open(systems))
+            linked = linked and bool(self.found.link)
+            return self.logged(self.loop.simulate(systems, linked=linked, errors=self.errors(more)))
+        told = self.open(systems)
+        return self.logged({name: values + more.get(name, 0.0) for name, values in told.items()})
+
+    def errors(self, left: Mapping[str, Array]) -> dict[str, Array]:
+        """What is left of readings by signal, as rows (ticks, channels) of the laboratories that have any, by role."""
+        none = np.zeros(self.record.ticks)
+        return {
+            lab.role: np.column_stack([left.get(name, none) for name in lab.measured])
+            for lab in self.record.labs
+            if any(name in left for name in lab.measured)
+        }
 
     def logged(self, simulated: Mapping[str, Array] | None) -> Mapping[str, Array] | None:
         """Simulated readings as the logger that was found has them: late, and with its gain."""

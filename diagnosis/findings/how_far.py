@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +12,8 @@ from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.gaps import RecordingGaps, judging
 from diagnosis.findings.series import numbers, strongest
-from diagnosis.findings.verdict import PartVerdict
+from diagnosis.findings.sites.shares import shares
+from diagnosis.findings.verdict import UNNAMED, PartVerdict
 from diagnosis.findings.where import SiteTrace
 from diagnosis.fits import hypothesis
 from diagnosis.recorded import loop
@@ -21,12 +21,8 @@ from diagnosis.recorded.loop import closed_share, overall
 from diagnosis.recorded.record import Record
 from diagnosis.report.evidence import History, LoopShare, Step
 from diagnosis.report.records import Gap, HowFar, SignalGap
-from diagnosis.signals.mask import Mask
 from models.registry import Array
 
-# Sites among which shares are computed exactly: each subset takes one simulation of the closed loop, and six sites have
-# 64 subsets.
-PLAYERS = 6
 # Machines to which a search ascribes the residual of a sensor that misses samples.
 LIKE_MISSED = ("damper", "column", "table", "device")
 # Times what a sensor's repeated samples can make up to which a residual may be theirs: several samples in a row err by
@@ -46,10 +42,8 @@ NOT_SHOWN = (
     "The response of the closed loop hardly shows the effects, so the share that closes is that of the readings of the "
     "part with the effect."
 )
-LEAVING = ("unknown", "partly")  # outcomes of parts with something left
 DRAWS = 200  # of the bootstrap: its 5 % and 95 % points then rest on ten draws each
 BLOCK = 2.0  # s, blocks of the bootstrap: two withheld pieces of 1 s lie side by side, and errors within are correlated
-NO_SHARE = 1e-4  # sum of the shares, as gaps, below which the response shows none of the sites
 
 
 @dataclass(frozen=True)
@@ -305,7 +299,7 @@ def all_traces(found: Diagnosis) -> list[SiteTrace]:
     result: list[SiteTrace] = []
     for verdict in found.verdicts:
         result += where.traces(verdict.search.data, verdict.search.chosen)
-        if verdict.outcome in LEAVING:
+        if verdict.outcome in UNNAMED:
             extra = where.unexplained(verdict.search.data, verdict.search.chosen)
             if all(item.site != extra.site for item in result):  # a named site keeps the trace of its effects
                 result.append(extra)
@@ -337,61 +331,10 @@ def may_be_missed(verdict: PartVerdict, name: str, share: float) -> bool:
     """
     search = verdict.search
     data, fit = search.data, search.commissioned
-    if verdict.outcome not in LEAVING or name not in data.part.signals:
+    if verdict.outcome not in UNNAMED or name not in data.part.signals:
         return False
     place = data.part.signals.index(name)
     left = data.residual(hypothesis.lay(data, fit.z, fit.values))[:, place]
     moved = np.diff(data.part.measured[:, place])
     caused = share * float(np.mean(moved**2))
     return bool(np.mean(left**2) < MISSED**2 * caused)
-
-
-def shares(
-    own: RecordingGaps, traces: Sequence[SiteTrace]
-) -> tuple[dict[str, tuple[float, float, float]], tuple[LoopShare, ...]]:
-    """Share of the response gap that each site causes, with its range over the thirds of the test.
-
-    Returned with it: exact Shapley values, and what correcting each site takes away as the first and as the last one.
-    """
-    sites = [trace.site for trace in sorted(traces, key=lambda item: -item.ratio)]
-    if len(sites) < 2:
-        return dict.fromkeys(sites, (1.0, 1.0, 1.0)), ()
-    players = sites[:PLAYERS]
-    simulated: dict[frozenset[str], Mapping[str, Array] | None] = {}
-
-    def value(mask: Mask, subset: frozenset[str]) -> float:
-        if subset not in simulated:
-            simulated[subset] = own.signals(subset)
-        return -overall(own.gap(simulated[subset], mask))
-
-    ticks = np.arange(own.record.ticks)
-    masks = [ticks >= 0, *(ticks * 3 // own.record.ticks == third for third in range(3))]
-    found = [where.shapley(players, functools.partial(value, mask)) for mask in masks]
-    weights = [normalised(item, traces) for item in found]
-    result = {}
-    for site in sites:
-        drawn = [item.get(site, 0.0) for item in weights]
-        result[site] = (drawn[0], min(drawn), max(drawn))
-    rows = tuple(
-        LoopShare(
-            site=site,
-            shapley=values[0],
-            interval=(min(item[site][0] for item in found), max(item[site][0] for item in found)),
-            first_in=values[1],
-            last_out=values[2],
-        )
-        for site, values in found[0].items()
-    )
-    return result, rows
-
-
-def normalised(
-    found: Mapping[str, tuple[float, float, float]], traces: Sequence[SiteTrace]
-) -> dict[str, float]:
-    """Shares that sum to one; where the response shows none of the sites, the traces in their own parts decide."""
-    sizes = {site: max(share, 0.0) for site, (share, _, _) in found.items()}
-    ratios = {trace.site: trace.ratio for trace in traces}
-    if sum(sizes.values()) <= NO_SHARE:
-        sizes = {site: ratios[site] for site in found}
-    total = sum(sizes.values()) or 1.0
-    return {site: size / total for site, size in sizes.items()}

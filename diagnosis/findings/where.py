@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -38,6 +36,9 @@ class SiteTrace:
     ratio: float  # its rms
     signal: str
     sigma: float
+    left: Mapping[str, Array] = field(
+        default_factory=dict
+    )  # of each signal (ticks,), where no effect explains it
 
 
 def traces(data: Data, fit: Fit) -> list[SiteTrace]:
@@ -78,6 +79,7 @@ def unexplained(data: Data, fit: Fit) -> SiteTrace:
         max(left),
         data.part.signals[int(np.argmax(left))],
         float(data.sigma[int(np.argmax(left))]),
+        dict(zip(data.part.signals, (data.steady(residual) * data.sigma).T, strict=True)),
     )
 
 
@@ -120,33 +122,6 @@ def hidden_in_displacement(fit: Fit) -> bool:
     motion[fast] = spectrum[fast] / omega[fast] ** 2
     implied = np.fft.irfft(motion, series.size)
     return float(np.sqrt(np.mean(implied**2))) < UNSEEN * data.sigma[0]
-
-
-def shapley(
-    players: Sequence[str], value: Callable[[frozenset[str]], float]
-) -> dict[str, tuple[float, float, float]]:
-    """Per player: exact Shapley share of `value(all) − value(none)`, its gain as the first and as the last one added.
-
-    Source: Shapley, A value for n-person games (1953). `value` is asked for all 2ⁿ subsets.
-    """
-    known = {
-        frozenset(subset): value(frozenset(subset))
-        for size in range(len(players) + 1)
-        for subset in itertools.combinations(players, size)
-    }
-    count, everyone, nobody = len(players), frozenset(players), frozenset[str]()
-    result = {}
-    for player in players:
-        share = 0.0
-        for subset, worth in known.items():
-            if player in subset:
-                continue
-            weight = math.factorial(len(subset)) * math.factorial(count - len(subset) - 1)
-            share += weight / math.factorial(count) * (known[subset | {player}] - worth)
-        first = known[frozenset({player})] - known[nobody]
-        last = known[everyone] - known[everyone - {player}]
-        result[player] = (share, first, last)
-    return result
 
 
 def when(trace: SiteTrace, record: Record, threshold: float = 1.0) -> tuple[tuple[float, float], ...]:

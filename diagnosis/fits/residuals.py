@@ -136,6 +136,13 @@ class Data:
             sums += ticks[:, tick]
         return np.asarray(sums / math.sqrt(self.group))
 
+    def steady(self, raw: Array) -> Array:
+        """Ticks (ticks, …) with the mean of each group at all of its ticks, which has less of the noise."""
+        result = raw.copy()
+        means = np.repeat(self.averaged(raw) / math.sqrt(self.group), self.group, axis=0)
+        result[: len(means)] = means
+        return result
+
     def reduced(self, system: System) -> Array:
         """Residuals in σ averaged over groups, (groups, signals), each of unit variance for white noise."""
         try:

@@ -38,12 +38,15 @@ class RecordedLoop:
     exchange: MessagesUsed | None  # which message each tick used, where the link was not as planned
     names: tuple[str, ...]  # response signals that were recorded
 
-    def simulate(self, systems: Systems, *, linked: bool = True, seed: int | None = None) -> Signals | None:
+    def simulate(
+        self, systems: Systems, *, linked: bool = True, errors: Mapping[str, Array] | None = None
+    ) -> Signals | None:
         """Response signals (ticks,) of systems, as their channels are stated to record them; None where it diverges.
 
-        `linked` with the recorded exchange.
+        `linked` with the recorded exchange; `errors` are as `every` takes them.
         """
-        found, interval = self.every(systems, linked=linked, seed=seed), self.record.plan.test.interval
+        found = self.every(systems, linked=linked, errors=errors)
+        interval = self.record.plan.test.interval
         if found is None:
             return None
         return {name: self.stated[name].through(found[name], interval) for name in self.names}
@@ -59,14 +62,24 @@ class RecordedLoop:
         }
         return {name: known.get(name, NOTHING_STATED) for name in self.names}
 
-    def every(self, systems: Systems, *, linked: bool = True, seed: int | None = None) -> Signals | None:
-        """All signals of systems by name, otherwise as `simulate`."""
+    def every(
+        self,
+        systems: Systems,
+        *,
+        linked: bool = True,
+        seed: int | None = None,
+        errors: Mapping[str, Array] | None = None,
+    ) -> Signals | None:
+        """All signals of systems by name, otherwise as `simulate`.
+
+        Their readings have the plan's noise with a `seed`, or `errors` (ticks, channels) of single roles.
+        """
         believed, system = self.record.plan.ground_motion.scale, systems[MASTER]
         factor = system.plan.ground_motion.scale / believed if believed else 1.0
         rows = substructure.shifted(
             self.ground * factor, system.effects.time_shift / system.plan.test.interval
         )
-        return simulated(self.record, systems, rows, self.exchange if linked else None, seed)
+        return simulated(self.record, systems, rows, self.exchange if linked else None, seed, errors)
 
     def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:
         """rms(recorded − simulated)/rms(recorded) per signal over some of the ticks."""
@@ -107,6 +120,7 @@ def simulated(
     ground: Array,
     exchange: MessagesUsed | None = None,
     seed: int | None = None,
+    errors: Mapping[str, Array] | None = None,
 ) -> Signals | None:
     """Signals of the closed loop of a record's test by name, None where it diverges.
 
@@ -127,6 +141,7 @@ def simulated(
         slaves=slaves,
         exchange={role: exchange} if exchange and role else None,
         seed=seed,
+        noise=errors,
     )
     if not rollout.finite:
         return None

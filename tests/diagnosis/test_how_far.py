@@ -15,6 +15,7 @@ from common.roles import MASTER
 from diagnosis.diagnose import examine
 from diagnosis.findings import gaps, how_far, where
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.sites.shares import shares
 from diagnosis.findings.where import SiteTrace
 from diagnosis.recorded import record
 from diagnosis.recorded.loop import closed_share, overall
@@ -193,6 +194,23 @@ def test_a_named_site_keeps_its_trace_where_something_is_left_there(
     assert len(traces) == 1
     assert traces[0] is not left
     assert traces[0].ratio > 5.0
+
+
+def test_an_unknown_effect_has_the_share_that_its_name_would_have(rubbing: Diagnosis) -> None:
+    named = next(item for item in rubbing.verdicts if item.effects)
+    search = named.search
+    unknown = dataclasses.replace(
+        named, search=dataclasses.replace(search, chosen=search.commissioned), outcome="unknown"
+    )
+    verdicts = [unknown if item is named else item for item in rubbing.verdicts]
+    alone = SiteTrace("actuator", np.zeros(0), 1.0, "", 1.0)  # which changes nothing
+    worth = []
+    for found in (rubbing, dataclasses.replace(rubbing, verdicts=verdicts)):
+        own = gaps.RecordingGaps(found, found.record, gaps.judging(found)[0])
+        _, rows = shares(own, [*how_far.all_traces(found), alone])
+        worth.append({row.site: row.shapley for row in rows})
+    assert worth[1]["column"] == pytest.approx(worth[0]["column"], rel=0.3)
+    assert worth[1]["actuator"] == 0.0
 
 
 def test_withheld_time_is_between_15_and_60_percent_of_the_test(cases: Cases) -> None:

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.findings import where
+from diagnosis.findings.sites.shares import shapley
 from diagnosis.findings.where import SiteTrace
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.residuals import Data
@@ -43,7 +44,7 @@ def games(draw: st.DrawFn) -> tuple[tuple[str, ...], Mapping[frozenset[str], flo
 @given(games())
 def test_shares_sum_to_the_total(game: tuple[tuple[str, ...], Mapping[frozenset[str], float]]) -> None:
     players, worth = game
-    found = where.shapley(players, worth.__getitem__)
+    found = shapley(players, worth.__getitem__)
     total = worth[frozenset(players)] - worth[frozenset()]
     assert sum(share for share, _, _ in found.values()) == pytest.approx(total, abs=1e-6)
 
@@ -53,14 +54,14 @@ def test_the_order_of_players_does_not_matter(
     game: tuple[tuple[str, ...], Mapping[frozenset[str], float]],
 ) -> None:
     players, worth = game
-    one, other = (where.shapley(order, worth.__getitem__) for order in (players, players[::-1]))
+    one, other = (shapley(order, worth.__getitem__) for order in (players, players[::-1]))
     for name in players:
         assert one[name] == pytest.approx(other[name], abs=1e-6)
 
 
 @given(st.lists(WORTH, min_size=5, max_size=5))
 def test_equal_players_get_equal_shares(by_size: list[float]) -> None:
-    found = where.shapley(PLAYERS[:4], lambda subset: by_size[len(subset)])
+    found = shapley(PLAYERS[:4], lambda subset: by_size[len(subset)])
     shares = [share for share, _, _ in found.values()]
     assert shares == pytest.approx([shares[0]] * 4, abs=1e-6)
 
@@ -70,7 +71,7 @@ def test_sites_whose_contributions_add_up_each_get_their_own_contribution(
     values: list[float], none: float
 ) -> None:
     alone = dict(zip(PLAYERS, values, strict=True))
-    found = where.shapley(PLAYERS, lambda subset: none + sum(alone[name] for name in subset))
+    found = shapley(PLAYERS, lambda subset: none + sum(alone[name] for name in subset))
     for name, (share, first, last) in found.items():
         assert share == pytest.approx(alone[name], abs=1e-6)
         assert first == pytest.approx(share, abs=1e-6)
@@ -78,7 +79,7 @@ def test_sites_whose_contributions_add_up_each_get_their_own_contribution(
 
 
 def test_a_site_without_a_contribution_gets_no_share() -> None:
-    found = where.shapley(PLAYERS[:3], lambda subset: float(len(subset - {"table"}) ** 2))
+    found = shapley(PLAYERS[:3], lambda subset: float(len(subset - {"table"}) ** 2))
     assert found["table"] == (0.0, 0.0, 0.0)
     assert found["column"] == found["actuator"] == (2.0, 1.0, 3.0)
 
