@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -25,6 +26,7 @@ UNSEEN = 0.5  # motion over the noise of the displacement sensor below which tha
 # A window belongs to a trace from this share of the trace's largest window on, but never above the second, so that the
 # strongest window always counts.
 PART_OF_PEAK, BELOW_PEAK = 0.25, 0.9
+ASKED = 8  # fits whose sites are kept: a report asks for those of each part several times
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class SiteTrace:
     sigma: float
     left: Mapping[str, Array] = field(
         default_factory=dict
-    )  # of each signal (ticks,), where no effect explains it
+    )  # (ticks,) by signal, of a site without a named cause
 
 
 def traces(data: Data, fit: Fit) -> list[SiteTrace]:
@@ -83,6 +85,7 @@ def unexplained(data: Data, fit: Fit) -> SiteTrace:
     )
 
 
+@lru_cache(maxsize=ASKED)
 def culprits(fit: Fit) -> tuple[str, ...]:
     """The sites from which what a fit leaves may come, the likeliest first; several where no reading tells them apart.
 

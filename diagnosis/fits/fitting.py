@@ -38,9 +38,9 @@ END = 1e-6  # of its range, within which an effect's parameter counts as at its 
 POLISHED = 12  # steps of a fit that leaves something, before that counts
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
-    """A hypothesis at its best: where its parameters are and what it costs."""
+    """A hypothesis at its best: where its parameters are and what it costs. Each equals itself alone."""
 
     data: Data
     values: Values

@@ -28,9 +28,7 @@ Values = dict[str, dict[str, float]]  # effect → parameter → value
 
 def lay(data: Data, z: Array, values: Values) -> System:
     """The plan with parameters moved and effects laid over it."""
-    system = data.system
-    for nuisance, place in zip(data.part.nuisances, z, strict=True):
-        system = nuisance.moved(system, float(place))
+    system = data.moved(z)
     for name, given in values.items():
         system = data.catalogue[name].apply(system, **given)
     return system

@@ -40,6 +40,7 @@ SPARSE = 0.5  # of an averaged sample's ticks that must be there
 # in all signals counts as little. The rms of Student's t with four degrees of freedom is then found to 2 to 6 %, where
 # the median alone says 13 % too little (simulated).
 OUTERMOST = 6.0
+KEPT = 32  # systems with moved parameters: fits over the parameters of effects keep to one, their slopes to one each
 FAR = 1e6  # residual, in σ, of a hypothesis that diverges: worse than any that does not
 
 
@@ -61,6 +62,24 @@ class Data:
     related: Crosswise | None = None  # what may follow from the part's inputs
     planned: Array | None = None  # (signals,) rms noise by the plan, 0 for none
     heard: Array | None = None  # (signals,) coloured noise that other signals' gaps made doubtful, 0 for none
+
+    @cached_property
+    def _systems(self) -> dict[bytes, System]:
+        """The last systems that `moved` has returned, by their nuisances."""
+        return {}
+
+    def moved(self, z: Array) -> System:
+        """The plan with its nominal parameters, and the logger's properties, at z (nuisances,) tolerances."""
+        place = z.tobytes()
+        system = self._systems.get(place)
+        if system is None:
+            system = self.system
+            for nuisance, by in zip(self.part.nuisances, z, strict=True):
+                system = nuisance.moved(system, float(by))
+            if len(self._systems) >= KEPT:
+                self._systems.clear()
+            self._systems[place] = system
+        return system
 
     @property
     def groups(self) -> int:

@@ -110,9 +110,11 @@ class Crosswise:
         said = np.zeros((PENALTIES.size, *y.shape))
         for k, (values, vectors) in enumerate(self._turned):
             here = self._fold == k
-            turned, wants = self._x[here] @ vectors, vectors.T @ (wanted - product[k])
-            for i, penalty in enumerate(PENALTIES * int(np.sum(~here))):
-                said[i, here] = turned @ (wants / (np.maximum(values, 0.0)[:, None] + penalty))
+            wants = vectors.T @ (wanted - product[k])
+            heavy = np.maximum(values, 0.0)[:, None] + PENALTIES * int(np.sum(~here))
+            weights = vectors @ (wants[:, None, :] / heavy[:, :, None]).reshape(len(values), -1)
+            told = (self._x[here] @ weights).reshape(-1, PENALTIES.size, y.shape[1])
+            said[:, here] = told.transpose(1, 0, 2)
         lost = np.sum((y - said) ** 2, axis=1)
         best = np.argmin(lost, axis=0)
         columns = np.arange(y.shape[1])
