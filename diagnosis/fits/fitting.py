@@ -7,6 +7,7 @@ z counts tolerances, so the second sum is the prior that the plan states: a maxi
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,6 +19,7 @@ from diagnosis.fits.hypothesis import Problem, Values, lay
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.threads import each
 from diagnosis.recorded.parts import Building
+from diagnosis.signals.mask import Mask
 from models.registry import Array
 
 ROUNDS = 4  # fits with the signals' weights renewed in between
@@ -33,6 +35,7 @@ LOST = 100.0  # mean square residual in σ² from which on fitted nominal parame
 # Times what a rival leaves, beyond which a fit comes no nearer by further steps or at the bottom of its valley: these
 # have taken away a third of what a fit left at most.
 CLOSE = 3.0
+CHANCE = 3.0  # standard deviations by which a signal costs less than its noise by chance
 TIED = 9.0  # cost by which hypotheses differ that can be told apart: 3 standard deviations squared
 END = 1e-6  # of its range, within which an effect's parameter counts as at its end
 POLISHED = 12  # steps of a fit that leaves something, before that counts
@@ -120,7 +123,19 @@ def weights(fit: Fit) -> Array:
 
 def excess(fit: Fit) -> float:
     """What a fit costs beyond noise."""
-    return max(0.0, fit.chi - fit.data.size) + fit.prior
+    return beyond_noise(fit, fit.data.judging) + fit.prior
+
+
+def beyond_noise(fit: Fit, judging: Mask) -> float:
+    """What residuals cost beyond noise by averaged samples (groups,), scaled to as many as there are.
+
+    A signal that costs less than its noise, because its σ is what a model may err by, does not pay for what another one
+    misses, but for what chance gives.
+    """
+    held = fit.reduced[judging]
+    more = np.mean(np.square(held), axis=0) - fit.data.live
+    chance = CHANCE * math.sqrt(2.0 / len(held))
+    return max(0.0, float(np.sum(np.maximum(more, -chance))) * fit.data.groups)
 
 
 def one_sided(fit: Fit, least: float = ONE_SIDED) -> bool:
@@ -159,7 +174,7 @@ def everywhere(fit: Fit) -> float:
     Fits that have not reached their end are ranked by it: an effect may show in few seconds, all of which they see,
     and until they have found its size they may be worse on the others.
     """
-    return max(0.0, float(np.sum(np.square(fit.reduced))) - fit.data.size) + fit.prior
+    return beyond_noise(fit, np.ones(fit.data.groups, dtype=bool)) + fit.prior
 
 
 def at(data: Data, values: Values, z: Array) -> Fit:

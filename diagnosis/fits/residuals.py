@@ -87,13 +87,17 @@ class Data:
         return self.part.measured.shape[0] // self.group
 
     @cached_property
+    def live(self) -> Mask:
+        """Signals (signals,) that have noise: those that were recorded and do not stand still."""
+        return np.asarray(self.there.any(axis=0) & (np.ptp(self.part.measured, axis=0) > 0.0))
+
+    @cached_property
     def size(self) -> int:
-        """How many averaged samples have noise: those of signals that were recorded and do not stand still.
+        """How many averaged samples have noise, those of signals that have any.
 
         Each costs one where only noise is left. A signal that was not recorded costs nothing, and must not be credited.
         """
-        heard = self.there.any(axis=0) & (np.ptp(self.part.measured, axis=0) > 0.0)
-        return self.groups * max(1, int(np.count_nonzero(heard)))
+        return self.groups * max(1, int(np.count_nonzero(self.live)))
 
     def residual(self, system: System) -> Array:
         """Recorded minus predicted, (ticks, signals), zero where nothing was recorded and where a reading has a spike.

@@ -22,7 +22,8 @@ MOST = 3  # effects of one part, the bias of a sensor aside: more of them can im
 TOGETHER, STEP_OF_LEFT = 6, 0.3
 # Systematic residual over noise that such a set is to explain, and the share of it that it may leave. The formula of a
 # law leaves 0.3 where the specimen has another one, and two effects that were not there took 0.308 to 0.296, just below
-# what can be seen. The least effect that counts as visible in a trial is 2.
+# what can be seen. The least effect that counts as visible in a trial is 2. Of a fainter residual beside `MOST` effects
+# a single further one must leave nothing: what a formula errs by, no one effect takes away.
 FAINT, CLEARLY = 0.5, 0.5
 HALVINGS = 20  # by which a value is found beyond which the system is the same
 
@@ -78,12 +79,18 @@ def searched(bare: Fit, scales: Scales) -> Search:
     if remaining(chosen) < worth.LOUD:  # what leaves more has not found its largest effects yet
         chosen = together(chosen, scales, beside if chosen is before else None)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
+    if (relieved := trade.relieved(chosen, others, scales, TOGETHER)) is not chosen:
+        chosen, others = relieved, [chosen, *candidates.alternatives(relieved, first, scales)]
+    chosen, others = trade.on_all(chosen, others)
     found = Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others)))
     found = plainest(believed(likeliest(found)))
-    if (chosen := fewest(found.chosen)) is found.chosen:
+    stands = found.chosen
+    if set(stands.names) != set(chosen.names) and remaining(stands) < worth.LOUD:
+        stands = together(stands, scales)  # what an exchanged effect hid
+    if (chosen := fewest(stands)) is found.chosen:
         return found
-    fewer = candidates.alternatives(chosen, first, scales)
-    return plainest(Search(bare.data, bare, chosen, tuple(map(trimmed, fewer))))
+    chosen, others = trade.on_all(chosen, candidates.alternatives(chosen, first, scales))
+    return plainest(Search(bare.data, bare, chosen, tuple(map(trimmed, others))))
 
 
 def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, list[Fit], list[Fit] | None]:
@@ -121,17 +128,28 @@ def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fi
     `beside` are fits with one effect more, best first, where they are known already.
     """
     fit, left = chosen, remaining(chosen)
-    while left > FAINT and leaves(fit, model_error(fit)) and len(fit.names) < TOGETHER:
+    faint = left <= FAINT
+    if faint and count(chosen) < MOST:
+        return chosen
+    share, size = (worth.REST, len(chosen.names) + 1) if faint else (STEP_OF_LEFT, TOGETHER)
+    while wanting(fit) and len(fit.names) < min(size, TOGETHER):
         further = beside if fit is chosen and beside is not None else candidates.best_laws(fit, scales)
-        if not further or excess(further[0]) > (1.0 - STEP_OF_LEFT) * excess(fit):
+        if not further or excess(further[0]) > (1.0 - share) * excess(fit):
             break
         fit = further[0]
+        if wanting(fit):  # an effect that came before may have stood in for the new one as well
+            fit = candidates.exchanged(fit, scales)
     most = min(worth.SEEN, CLEARLY * left)
-    if len(fit.names) == len(chosen.names) or remaining(fit) > most:
+    if len(fit.names) == len(chosen.names) or remaining(fit) > most or (faint and worth.is_gap(fit)):
         return chosen
     fit = needed(fit, most)
     usual = fit.prior < max(worth.SUSPICIOUS, chosen.prior)
     return fit if usual and len(fit.names) > len(chosen.names) else chosen
+
+
+def wanting(fit: Fit) -> bool:
+    """Whether a further effect may be missing: more is left than a model errs by, or nominal parameters stand in."""
+    return leaves(fit, model_error(fit)) or worth.strained(fit)
 
 
 def needed(fit: Fit, most: float) -> Fit:

@@ -28,6 +28,7 @@ RIVALS = 2  # single effects behind the best one that are tried with a second on
 # what two effects do. A spring and dashpot in series beside a column leave 0.3 then, in place of a dashpot and a lag.
 NEARING = 0.5
 TRIED = 3  # candidates that are fitted in such a place: they must come close at once
+REFITTED = 8  # steps over all seconds of hypotheses that leave as much of those seen
 PULLED = 3.84  # of Σ z²: a single effect that truly is none brings back as much in one of twenty cases (χ²)
 
 
@@ -39,6 +40,38 @@ def tied(chosen: Fit, other: Fit) -> bool:
     noise = max(1.0, chosen.chi / chosen.data.size)
     apart = float(np.sum(np.square(other.reduced - chosen.reduced)))
     return (other.cost - chosen.cost) / noise < TIED and apart / noise < APART
+
+
+def on_all(fit: Fit, others: Sequence[Fit]) -> tuple[Fit, list[Fit]]:
+    """A fit and others with one effect exchanged, fitted to all seconds where the data cannot tell them apart then.
+
+    Parameters that the seconds seen hardly tell err in the withheld ones, by which hypotheses are ranked, and in one
+    hypothesis more than in another that leaves as much of what both have seen.
+    """
+    seen = seen_cost(fit)
+    alike = [
+        item
+        for item in others
+        if len(item.names) == len(fit.names) and abs(seen_cost(item) - seen) < TIED and not tied(fit, item)
+    ]
+    if not alike or fit.data.train.all():
+        return fit, list(others)
+    best, *rivals = each(
+        lambda item: fitting.fit(fit.data.whole, item.values, item.z, REFITTED, rounds=1), [fit, *alike]
+    )
+    level = {id(item): rival for item, rival in zip(alike, rivals, strict=True) if tied(best, rival)}
+    if not level:
+        return fit, list(others)
+
+    def here(item: Fit) -> Fit:
+        return fitting.at(fit.data, item.values, item.z)
+
+    return here(best), [here(level[id(item)]) if id(item) in level else item for item in others]
+
+
+def seen_cost(fit: Fit) -> float:
+    """What the seconds that a fit has seen cost, with its prior."""
+    return float(np.sum(np.square(fit.reduced[fit.data.train]))) + fit.prior
 
 
 def freedom(fit: Fit) -> tuple[int, int]:
@@ -160,3 +193,19 @@ def released(fit: Fit, scales: Scales) -> list[Fit]:
         return []
     others = candidates.extended(fit, scales, count=TRIED, known=fit)
     return [item for item in others if tied(fit, item) and item.prior < fit.prior - PULLED]
+
+
+def relieved(fit: Fit, rivals: Sequence[Fit], scales: Scales, most: int) -> Fit:
+    """The fit, or one with two effects in the place of one that brings back nominal parameters which moved too far.
+
+    `rivals` are fits with one effect exchanged, best first. One effect may do what two do, as a compliance what a gain
+    and a time constant do, if nominal parameters do the rest.
+    """
+    if fit.prior <= worth.SUSPICIOUS or len(fit.names) < 2 or len(fit.names) >= most:
+        return fit
+    others: list[Fit] = []
+    for rival in [item for item in rivals if len(item.names) == len(fit.names)][:RIVALS]:
+        others += candidates.extended(rival, scales, count=TRIED, known=fit)[:1]
+    level = [item for item in others if item.prior < fit.prior - PULLED and item.cost < fit.cost + TIED]
+    sound = [item for item in level if not worth.is_gap(item)]
+    return min(sound, key=lambda item: item.cost, default=fit)

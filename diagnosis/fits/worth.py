@@ -30,8 +30,13 @@ CANCELLED = 4.0  # times the gap that one of several effects may make: beyond it
 
 def is_gap(fit: Fit) -> bool:
     """Whether a fit leaves anything to explain: beyond noise, or beyond its tolerances."""
+    return leaves(fit) or strained(fit)
+
+
+def strained(fit: Fit) -> bool:
+    """Whether nominal parameters have moved too far: all of them together, or one."""
     far = float(np.max(np.abs(fit.z), initial=0.0)) ** 2 > PRIOR_GAIN
-    return leaves(fit) or fit.prior > SUSPICIOUS or far
+    return fit.prior > SUSPICIOUS or far
 
 
 def enough(bare: Fit, fit: Fit) -> bool:

@@ -287,13 +287,23 @@ def test_an_effect_that_is_small_beside_another_is_named_where_both_leave_only_n
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "taken"),
-    [(0.308, 0.296, False), (0.45, 0.0, False), (0.7, 0.4, False), (0.7, 0.29, True)],
+    ("before", "after", "count", "taken"),
+    [
+        (0.308, 0.296, 1, False),
+        (0.45, 0.0, 1, False),
+        (0.45, 0.0, 3, True),
+        (0.45, 0.2, 3, False),
+        (0.7, 0.4, 1, False),
+        (0.7, 0.29, 1, True),
+    ],
 )
 def test_a_faint_rest_is_not_filled_up_with_effects(
-    monkeypatch: pytest.MonkeyPatch, before: float, after: float, taken: bool
+    monkeypatch: pytest.MonkeyPatch, before: float, after: float, count: int, taken: bool
 ) -> None:
     one, two = SimpleNamespace(names=("a",), prior=0.0), SimpleNamespace(names=("a", "b"), prior=0.0)
+    monkeypatch.setattr("diagnosis.fits.search.count", lambda _: count)
+    monkeypatch.setattr(worth, "strained", lambda _: False)
+    monkeypatch.setattr(worth, "is_gap", lambda fit: fit is one or after > 0.1)
     left = {one.names: before, two.names: after}
     monkeypatch.setattr("diagnosis.fits.search.remaining", lambda fit: left[fit.names])
     monkeypatch.setattr("diagnosis.fits.search.leaves", lambda fit, _: fit is one)

@@ -1,0 +1,95 @@
+"""Several effects in one laboratory: what stands in for two, and what hides behind a strained parameter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from diagnosis.fits import candidates, fitting, residuals, trade, worth
+from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import together
+from models.registry import Array
+from tests.diagnosis.cases import Cases, Effects, lab_a
+from tests.diagnosis.test_equivalents import DATA, NOISY
+
+# three of them leave little, with the nominal stiffness at the end of its range
+FOUR: Effects = {
+    "actuator.time_constant": {"factor": 1.12},
+    "actuator.delay": {"delay": 0.0021},
+    "column.degradation": {"rate": 0.0445},
+    "column.stiffness": {"factor": 1.07},
+}
+
+
+def fit(names: str, z: float = 0.0, off: Array | float = 0.0) -> Fit:
+    return Fit(DATA, {name: {} for name in names}, np.full(1, z), NOISY + off)
+
+
+def test_a_signal_of_less_than_its_noise_does_not_pay_for_what_another_one_misses() -> None:
+    live = np.ones(2, dtype=bool)
+    data = SimpleNamespace(
+        live=live, groups=1000, size=2000, judging=np.ones(1000, dtype=bool), train=np.zeros(1000, dtype=bool)
+    )
+    noise = np.random.default_rng(1).standard_normal((1000, 2))
+
+    def left(*sizes: float) -> Fit:
+        return Fit(data, {}, np.zeros(0), noise / noise.std(axis=0) * sizes)  # type: ignore[arg-type]
+
+    assert excess(left(0.97, 1.03)) < 10.0  # as chance has it
+    assert left(0.5, 1.2).chi < data.size
+    assert excess(left(0.5, 1.2)) > 300.0
+
+
+def test_an_effect_beside_three_is_found_by_the_nominal_parameter_that_stands_in_for_it(cases: Cases) -> None:
+    whole = cases.record(FOUR, seed=0, duration=6.0)
+    data, scales = residuals.prepare(lab_a(whole), whole), Scales(whole)
+    three = fitting.fit(data, {name: FOUR[name] for name in list(FOUR)[:3]})
+    assert worth.strained(three)
+    names = set(together(three, scales).names)
+    assert set(list(FOUR)[:3]) < names
+    assert names - set(FOUR) <= {"sensor.column_force.gain", "sensor.column_displacement.gain"}
+
+
+def test_an_effect_that_came_before_is_exchanged_beside_one_that_it_stood_in_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    one, wrong, right = fit("a"), fit("ab"), fit("bc")
+    left = {one.names: 4.0, wrong.names: 0.475, right.names: 0.0}
+    monkeypatch.setattr("diagnosis.fits.search.remaining", lambda item: left[item.names])
+    monkeypatch.setattr("diagnosis.fits.search.leaves", lambda item, _: left[item.names] > 0.0)
+    monkeypatch.setattr("diagnosis.fits.search.model_error", lambda _: 0.0)
+    monkeypatch.setattr("diagnosis.fits.search.excess", lambda item: 1e3 * left[item.names])
+    monkeypatch.setattr(candidates, "best_laws", lambda item, _: [wrong] if item is one else [])
+    monkeypatch.setattr(candidates, "exchanged", lambda *_: right)
+    monkeypatch.setattr(candidates, "without", lambda *_: one)
+    assert together(one, None) is right  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("z", "after", "relieved"), [(3.3, 0.4, True), (2.4, 0.4, False), (3.3, 2.9, False)])
+def test_two_effects_take_the_place_of_one_where_they_bring_nominal_parameters_back(
+    monkeypatch: pytest.MonkeyPatch, z: float, after: float, relieved: bool
+) -> None:
+    chosen, rival, two = fit("ab", z), fit("ac", 5.0, 1.0), fit("acd", after)
+    monkeypatch.setattr(candidates, "extended", lambda *_, **__: [two])
+    monkeypatch.setattr(worth, "is_gap", lambda _: False)
+    assert trade.relieved(chosen, [rival], None, 6) is (two if relieved else chosen)  # type: ignore[arg-type]
+
+
+def test_hypotheses_that_err_in_withheld_seconds_only_are_told_apart_by_fits_to_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    held = 0.5 * ~DATA.train[:, None]
+    chosen, rival, other = fit("a"), fit("b", 0.0, held), fit("c", 0.0, 0.5)
+    assert not trade.tied(chosen, rival)
+    better = {("a",): fit("a"), ("b",): fit("b", 0.0, 1e-3)}
+    monkeypatch.setattr(fitting, "fit", lambda _data, values, *_, **__: better[tuple(values)])
+    monkeypatch.setattr(fitting, "at", lambda _data, values, _z: better[tuple(values)])
+    best, (moved, still) = trade.on_all(chosen, [rival, other])
+    assert trade.tied(best, moved)
+    assert still is other
+    better["b",] = replace(better["b",], reduced=NOISY + 0.5)  # further away once more is seen
+    assert trade.on_all(chosen, [rival, other]) == (chosen, [rival, other])
