@@ -164,7 +164,8 @@ def how_well(search: Search) -> Outcome:
     """
     fit = search.chosen
     strained = bool(pinned(fit)) or farthest(fit) < HALF or bool(at_end(fit))
-    if not (strained or leaves(fit, allowed(search)) or unproven(search)):
+    everywhere = fitting.at(replace(fit.data, vague=None), fit.values, fit.z)  # behind impacts as well
+    if not (strained or leaves(everywhere, allowed(search)) or unproven(search)):
         return "explained"
     return "partly" if search.explained > HALF else "unknown"
 

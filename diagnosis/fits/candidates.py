@@ -19,7 +19,7 @@ from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import ScreenedEffect, screen
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import MATERIAL, leaves, remaining
-from diagnosis.fits.worth import LOUD, is_gap, is_worth
+from diagnosis.fits.worth import LOUD, is_gap
 
 # Of what a fit leaves: an effect that promises more is near the cause. Of two tables with play behind their loop the
 # best other effect promised 2 and 5 %, play before the loop at most 0.2 %, and play behind it 5 and 33 %.
@@ -106,27 +106,6 @@ def with_stop(fit: Fit, fits: list[Fit]) -> list[Fit]:
     return sorted([found, *rest], key=lambda item: item.cost)
 
 
-def beside_stop(fit: Fit, scales: Scales) -> list[Fit]:
-    """The fit with one effect more that shows before its end stop is met, if a large residual is left; else none.
-
-    After an impact a simulation and a laboratory part, and what a fit has not reached yet looks like an error of a
-    reading. Of effects that are alike before it the one counts that leaves least after it.
-    """
-    stop = contact.stop_of(fit)
-    if stop is None or remaining(fit) < LOUD or (short := contact.before(fit)) is None:
-        return []
-    rest = {name: values for name, values in fit.values.items() if name != stop.name}
-    bare = fitting.fit(short, rest)
-    if not leaves(bare):
-        return []
-    shown = [item for item in extended(bare, scales)[:FINE] if is_worth(bare, bare, item)]
-    level = [item for item in shown if item.cost < shown[0].cost + TIED]
-    groups = short.groups + contact.after(fit.data)
-    fits = each(lambda item: contact.grown(fit.data, item, stop, fit.values[stop.name], groups), level)
-    best = sorted(fits, key=lambda item: item.cost)[:1]
-    return [in_order(item, fit) for item in best if item.cost < fit.cost]
-
-
 def in_order(found: Fit, fit: Fit) -> Fit:
     """A fit with its effects in the order of another one, further ones last."""
     names = [*fit.names, *(name for name in found.names if name not in fit.names)]
@@ -134,12 +113,8 @@ def in_order(found: Fit, fit: Fit) -> Fit:
 
 
 def best_laws(fit: Fit, scales: Scales) -> list[Fit]:
-    """Fits with one effect more, best first, each effect under the law of its mechanism that leaves least.
-
-    An effect that shows before an end stop is met comes first.
-    """
-    found = in_best_laws(with_stop(fit, extended(fit, scales)))
-    return [*beside_stop(fit, scales), *found]
+    """Fits with one effect more, best first, each effect under the law of its mechanism that leaves least."""
+    return in_best_laws(with_stop(fit, extended(fit, scales)))
 
 
 def without(fit: Fit, name: str) -> Fit:

@@ -18,7 +18,6 @@ from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import cost, simplest
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.threads import each
-from diagnosis.fits.unexplained import leaves
 from laboratories.effects.effect import Effect
 from models.registry import Array
 
@@ -76,26 +75,22 @@ def stop_of(fit: Fit) -> Effect | None:
     return next((effect for effect in effects if effect.contact), None)
 
 
-def before(fit: Fit) -> Data | None:
-    """The data until the motion comes near the end stop of a fit; None without one, or where that is too short."""
+def vaguer(fit: Fit) -> Fit | None:
+    """A fit with an end stop at its best by how well impacts are known; None without a stop, or where that is known.
+
+    After an impact a simulation and a laboratory part, since the stop of the latter has another law. How far is told by
+    how far two laws part that each fit best: from an impact on a sample counts by that.
+    """
     effect, data = stop_of(fit), fit.data
-    if effect is None or effect.contact is None or effect.contact.motion not in data.part.signals:
+    if effect is None or data.vague is not None or len(effect.laws) < 2:
         return None
-    stroke = np.abs(data.part.measured[:, data.part.signals.index(effect.contact.motion)])
-    place = fit.values[effect.name][effect.contact.place]
-    groups = int(np.argmax(stroke >= INSIDE[0] * place)) // data.group
-    if groups * data.group * data.system.plan.test.interval < ENOUGH:
-        return None
-    return replace(data, part=data.part.first(groups * data.group), train=data.train[:groups])
-
-
-def better_before(fit: Fit, other: Fit) -> bool:
-    """Whether a fit with an end stop that leaves something misses less than another one until that stop is met."""
-    short = before(fit) if leaves(fit) else None
-    if short is None:
-        return False
-    own, others = (fitting.everywhere(fitting.at(short, item.values, item.z)) for item in (fit, other))
-    return own < others - fitting.TIED
+    own = fit.values[effect.name]
+    others = [effect.under(place, own) for place in range(len(effect.laws)) if place != int(own.get("law", 0))]
+    rest = [fitting.fit(data, fit.values | {effect.name: values}, fit.z, steps=6, rounds=1) for values in others]
+    stops = [fitting.at(data, fit.values | {effect.name: item.values[effect.name]}, fit.z) for item in rest]
+    apart = np.max([np.abs(item.reduced - fit.reduced) for item in stops], axis=0)
+    vague = np.sqrt(1.0 + np.square(np.maximum.accumulate(apart, axis=0)))
+    return fitting.polished(fitting.at(replace(data, vague=vague), fit.values, fit.z))
 
 
 def by_law(fits: Sequence[Fit], name: str) -> tuple[list[Fit], list[Fit]]:

@@ -62,6 +62,8 @@ class Data:
     related: Crosswise | None = None  # what may follow from the part's inputs
     planned: Array | None = None  # (signals,) rms noise by the plan, 0 for none
     heard: Array | None = None  # (signals,) coloured noise that other signals' gaps made doubtful, 0 for none
+    # (groups, signals) times the noise that an averaged sample behind an impact is known to; None where none is
+    vague: Array | None = None
 
     @cached_property
     def _systems(self) -> dict[bytes, System]:
@@ -183,6 +185,11 @@ class Data:
 
     def whitened(self, raw: Array) -> Array:
         """Residuals in σ (ticks, signals) averaged over groups and whitened, (groups, signals); `raw` may change."""
+        result = self.coloured(raw)
+        return result if self.vague is None else result / self.vague[: len(result)]
+
+    def coloured(self, raw: Array) -> Array:
+        """The same where all that was recorded counts alike."""
         if self.factors is None:
             return finite(self.averaged(raw))
         for place in np.flatnonzero(~self.there.all(axis=0)):
@@ -261,7 +268,7 @@ def by_tick(data: Data) -> Data:
     """The residuals of a part without averages, for what changes from tick to tick."""
     train = np.repeat(data.train, data.group)
     rest = np.full(len(data.part.measured) - train.size, train[-1])
-    return replace(data, group=1, train=np.concatenate([train, rest]))
+    return replace(data, group=1, train=np.concatenate([train, rest]), vague=None)
 
 
 def withheld_ticks(ticks: int, interval: float) -> Mask:

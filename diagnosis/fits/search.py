@@ -103,6 +103,7 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
     while better and worth.is_worth(bare, chosen, best := trade.foremost(better)):
         best = candidates.in_other_laws(candidates.exchanged(best, scales)) if len(best.names) > 1 else best
         chosen = settling.settled(best, bare.data)
+        chosen = by_impacts(bare, chosen)
         while count(chosen) < MOST and (more := settling.beside_colour(chosen, scales)):
             chosen = more
         if chosen.data is not bare.data:
@@ -113,6 +114,15 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
             return bare, chosen, first, None
         better = candidates.best_laws(chosen, scales)
     return bare, chosen, first, better
+
+
+def by_impacts(bare: Fit, fit: Fit) -> Fit:
+    """A fit that leaves much, measured by how well impacts are known where an end stop is worth it by that as well."""
+    vaguer = contact.vaguer(fit) if remaining(fit) > worth.LOUD else None
+    if vaguer is None:
+        return fit
+    without = settling.again(bare, vaguer.data)
+    return vaguer if worth.is_worth(without, without, vaguer) else fit
 
 
 def count(fit: Fit) -> int:
@@ -221,15 +231,12 @@ def trimmed(fit: Fit) -> Fit:
 def likeliest(search: Search) -> Search:
     """The search with that one in front of as many effects that is far likelier than the chosen ones.
 
-    The effects beside an exchanged one were chosen before it, so that a further exchange may still pay. What an end
-    stop leaves decides nothing between effects that differ before it is met.
+    The effects beside an exchanged one were chosen before it, so that a further exchange may still pay.
     """
     chosen = search.chosen
     same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
     best = min(same, key=lambda fit: fit.cost, default=chosen)
     if best.cost > chosen.cost - fitting.TIED or remaining(best) > remaining(chosen):
-        return search
-    if contact.better_before(chosen, best):
         return search
     return in_front(search, best)
 

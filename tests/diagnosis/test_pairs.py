@@ -10,7 +10,6 @@ import pytest
 from diagnosis.fits import candidates, contact, fitting, residuals, sensor_noise, settling, trade, worth
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
-from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import fewest, pruned
 from diagnosis.signals import colour
 from diagnosis.signals.noise_model import NoiseModel
@@ -96,29 +95,29 @@ def test_a_simpler_description_stands_unless_it_moves_a_nominal_parameter_too_fa
     assert len(others) == 1
 
 
-def test_what_shows_before_an_end_stop_is_met_is_told_from_what_looks_alike_after_it(
-    cases: Cases, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_an_impact_makes_vague_counts_less_than_what_shows_before_it(cases: Cases) -> None:
     whole = cases.record(LOUDER, duration=4.0)
-    part, nominal = lab_b(whole), np.zeros(7)
-    part.candidates = tuple(one for one in part.candidates if one.name.endswith(("gain", "stop")))
-    data = residuals.prepare(part, whole)
+    data, nominal = residuals.prepare(lab_b(whole), whole), np.zeros(7)
     stop = fitting.at(data, {"damper.stroke_stop": {"stroke": 0.0402, "stiffness": 2000.0}}, nominal)
-    short = contact.before(stop)
-    assert short is not None
-    stroke = np.abs(data.part.measured[:, data.part.signals.index("damper_stroke")])
-    assert stroke[: short.groups * short.group].max() < 0.97 * 0.0402
+    known = contact.vaguer(stop)
+    assert known is not None
+    assert known.cost < stop.cost
+    vague = known.data.vague
+    assert vague is not None
+    place = data.part.signals.index("damper_stroke")
+    stroke = np.abs(data.part.measured[: data.groups * data.group, place])
+    met = int(np.argmax(stroke > 0.04)) // data.group
+    assert np.all(vague[: met - 1] == 1.0)
+    assert np.all(np.diff(vague, axis=0) >= 0.0)
+    assert vague[-1, place] > 10.0
+    assert np.all(vague[:, data.part.signals.index("table_displacement")] == 1.0)  # the stop is not the table's
     true, wrong = (
-        fitting.at(data, {**stop.values, name: {"factor": 1.1}}, nominal)
+        fitting.at(known.data, stop.values | {name: {"factor": 1.1}}, nominal)
         for name in ("damper.gain", "sensor.damper_force.gain")
     )
-    assert contact.better_before(true, wrong)
-    assert not contact.better_before(wrong, true)
-    monkeypatch.setattr(
-        contact, "grown", lambda _data, item, *_: replace(true, values=item.values | stop.values)
-    )
-    (found,) = candidates.beside_stop(stop, Scales(whole))
-    assert found.names == ("damper.stroke_stop", "damper.gain")
+    assert true.cost < wrong.cost
+    assert contact.vaguer(known) is None
+    assert residuals.by_tick(known.data).vague is None
 
 
 @pytest.mark.parametrize(
