@@ -38,6 +38,7 @@ class ColumnEffects:
     yield_displacement: float = math.inf  # m
     hardening: float = 0.0
     exponent: float = 2.0  # sharpness of the transition: Bouc-Wen's n, Menegotto and Pinto's R₀, also of bars
+    yield_loop: float = 0.5  # Bouc-Wen's β: 0.5 unloads elastically, 1 is the endochronic law
     law: float = 0.0  # index of the law of yielding in `laboratories.column.specimen.LAWS`
     turn: float = 0.0  # reversal over the yield displacement below which Menegotto and Pinto's branch goes on
     unloading: float = 0.0  # exponent of the unloading stiffness, of a peak-oriented or pinched specimen
@@ -117,6 +118,7 @@ class TableEffects:
     friction_asymmetry: float = 0.0  # share more in the positive direction, and less in the other
     friction_drop: float = 0.0  # share that is lost at speed
     friction_speed: float = 0.02  # m/s, at which two thirds of that are lost
+    presliding: float = 0.0  # m, in which the friction's bristles bend; 0 for a friction that sticks at once
     learned: tuple[float, ...] = ()  # a law of `models.preisach` of the table's motion that brakes it, m/s²
 
 

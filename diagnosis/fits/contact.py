@@ -85,8 +85,12 @@ def vaguer(fit: Fit) -> Fit | None:
     if effect is None or data.vague is not None or len(effect.laws) < 2:
         return None
     own = fit.values[effect.name]
-    others = [effect.under(place, own) for place in range(len(effect.laws)) if place != int(own.get("law", 0))]
-    rest = [fitting.fit(data, fit.values | {effect.name: values}, fit.z, steps=6, rounds=1) for values in others]
+    others = [
+        effect.under(place, own) for place in range(len(effect.laws)) if place != int(own.get("law", 0))
+    ]
+    rest = [
+        fitting.fit(data, fit.values | {effect.name: values}, fit.z, steps=6, rounds=1) for values in others
+    ]
     stops = [fitting.at(data, fit.values | {effect.name: item.values[effect.name]}, fit.z) for item in rest]
     apart = np.max([np.abs(item.reduced - fit.reduced) for item in stops], axis=0)
     vague = np.sqrt(1.0 + np.square(np.maximum.accumulate(apart, axis=0)))

@@ -44,6 +44,7 @@ LAWS = (
     "pinched_by_rest",
     "pinched_by_rest",
     "layered",
+    "bouc_wen",
 )  # of yielding, in the order of `ColumnEffects.law`
 PLAYS = ORIGIN, RESTING, HELD, PARTLY, ROUNDED = range(5)  # where the gap is: see `column.slip`
 IN_PLACE = 2  # of `ColumnEffects.friction_law`: a slider in the place of the planned specimen
@@ -157,7 +158,7 @@ def yielding(stiffness: float, effects: ColumnEffects) -> Array:
     name, hardening = LAWS[int(effects.law)], effects.hardening
     shape: list[float] = []  # behind stiffness, yield displacement and hardening
     if name == "bouc_wen":
-        shape = [effects.exponent, 0.5, 0.5]
+        shape = [effects.exponent, effects.yield_loop, 1.0 - effects.yield_loop]
     elif name == "menegotto_pinto":
         shape = [effects.exponent, 0.925, 0.15, effects.turn]
     elif name == "clough":  # which has no negative hardening

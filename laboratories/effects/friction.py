@@ -1,4 +1,4 @@
-"""The parameters that all friction in the catalogue shares: how its force depends on speed and on direction."""
+"""The parameters that all friction in the catalogue shares: how its force depends on speed, direction and way."""
 
 from __future__ import annotations
 
@@ -60,3 +60,37 @@ def laws(shapes: Mapping[str, float]) -> tuple[Law, ...]:
     """The two laws of a friction with these parameters of shape: Coulomb's, and one by direction and speed."""
     sided = {"velocity": 3e-4, "asymmetry": 0.0, "drop": 0.1, "speed": 0.02}
     return Law("Coulomb", shapes), Law("by direction and speed", {**shapes, **sided})
+
+
+COULOMB = {"velocity": 1e-6}
+BRISTLED = FURTHER | {
+    "": which_law(
+        3.0,
+        "0 the same in both directions and at all speeds, 1 by direction and speed, 2 by direction and with "
+        "presliding, 3 all of it",
+    ),
+    "presliding": Parameter(
+        "presliding",
+        "m",
+        null=0.0,
+        least=1e-6,
+        most=0.005,
+        sizes=(3e-05, 0.0005),
+        says="distance over which the force of laws 2 and 3 approaches its size after a reversal",
+        shape=True,
+    ),
+}
+"""The same of a friction that may have bristles, with two laws more."""
+
+
+def bristled() -> tuple[Law, ...]:
+    """The four laws of a friction that may have bristles."""
+    return (
+        *laws(COULOMB),
+        Law("with presliding", {"presliding": 1e-4, "asymmetry": 0.0}, fixed=COULOMB),
+        Law(
+            "by direction and speed, with presliding",
+            {"presliding": 1e-4, "asymmetry": 0.0, "drop": 0.1, "speed": 0.02},
+            fixed=COULOMB,
+        ),
+    )

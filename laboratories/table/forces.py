@@ -41,7 +41,9 @@ from laboratories.table.record import (
     STOP_DAMPING,
     STOP_EXPONENT,
     STOP_STIFFNESS,
+    TABLE_BRISTLES,
     TABLE_FRICTION,
+    TABLE_PRESLIDING,
     TABLE_SHAPE,
     TABLE_VELOCITY,
     VALVE,
@@ -158,20 +160,35 @@ def resist(columns: Array, lab: TableLab, length: float) -> None:
         place = state[base - 1] + 0.5 * columns[base, base - 1] * state[base]
         state[drag] -= preisach.step(lab.braked, lab.braked_memory, place, state[base])
     if limits[TABLE_FRICTION] > 0.0:
-        least = -limits[TABLE_FRICTION] * (1.0 + limits[TABLE_SHAPE])
-        most = limits[TABLE_FRICTION] * (1.0 - limits[TABLE_SHAPE])
-        left = midway(columns, lab, base, drag, least, most, TABLE_SHAPE, limits[TABLE_VELOCITY])
-        state[drag] += stopping(columns, lab, base, drag, left * least, left * most)
+        state[drag] += bearings(columns, lab, length, base)
     if limits[FRICTION] > 0.0:
         least, most = -limits[FRICTION] * (1.0 - limits[SHAPE]), limits[FRICTION] * (1.0 + limits[SHAPE])
         left = midway(columns, lab, STROKE_RATE, rail, least, most, SHAPE, limits[VELOCITY])
         least, most = left * least, left * most
         if limits[PRESLIDING] > 0.0:
-            place = size + INPUTS + BRISTLES
-            state[place] = bent(columns, lab, length, least, most, limits[PRESLIDING])
+            place, yields = size + INPUTS + BRISTLES, -columns[rail, STROKE_RATE]
+            state[place] = bent(
+                columns, lab, length, STROKE_RATE, place, yields, (least, most), limits[PRESLIDING]
+            )
             state[rail] += state[place]
         else:
             state[rail] += stopping(columns, lab, STROKE_RATE, rail, least, most)
+
+
+@jit
+def bearings(columns: Array, lab: TableLab, length: float, base: int) -> float:
+    """Acceleration (m/s²) that the friction of the table's bearings gives it over a segment; `base` is its rate."""
+    limits, state, size = lab.limits, lab.state, columns.shape[0] - INPUTS
+    drag, place = size + 4, size + INPUTS + TABLE_BRISTLES
+    least = -limits[TABLE_FRICTION] * (1.0 + limits[TABLE_SHAPE])
+    most = limits[TABLE_FRICTION] * (1.0 - limits[TABLE_SHAPE])
+    left = midway(columns, lab, base, drag, least, most, TABLE_SHAPE, limits[TABLE_VELOCITY])
+    least, most = left * least, left * most
+    if limits[TABLE_PRESLIDING] == 0.0:
+        return stopping(columns, lab, base, drag, least, most)
+    yields = columns[drag, base]
+    state[place] = bent(columns, lab, length, base, place, yields, (-most, -least), limits[TABLE_PRESLIDING])
+    return -float(state[place])
 
 
 @jit
@@ -231,17 +248,26 @@ def stopping(columns: Array, lab: TableLab, rate: int, place: int, least: float,
 
 
 @jit
-def bent(columns: Array, lab: TableLab, length: float, least: float, most: float, presliding: float) -> float:
-    """Force (N) of the rail's bristles at a segment's end, if it has acted over the whole of the segment.
+def bent(
+    columns: Array,
+    lab: TableLab,
+    length: float,
+    rate: int,
+    place: int,
+    yields: float,
+    ends: tuple[float, float],
+    presliding: float,
+) -> float:
+    """Force of bristles against the rate at a segment's end, if it has acted over the whole of the segment.
 
-    The mass goes on by the velocity at the segment's end, so that stiff bristles stop it and it does not chatter; with
-    ever stiffer ones this becomes `stopping`. The distance is the root of an increasing and concave function, which
-    Halley's method seeks from below.
+    State `place` holds it at the beginning, and state `rate`, a velocity (m/s), loses `yields` times it over the
+    segment; `ends` are the least and the largest force. The part goes on by the velocity at the segment's end, so that
+    stiff bristles stop it and it does not chatter; with ever stiffer ones this becomes `stopping`. The distance is the
+    root of an increasing and concave function, which Halley's method seeks from below.
     """
-    size = columns.shape[0] - INPUTS
-    yields = -columns[size + 3, STROKE_RATE]
-    force = min(max(lab.state[size + INPUTS + BRISTLES], least), most)
-    ahead = length * (with_forces(columns, lab.state, lab.free, STROKE_RATE) - yields * force)
+    least, most = ends
+    force = min(max(lab.state[place], least), most)
+    ahead = length * (with_forces(columns, lab.state, lab.free, rate) - yields * force)
     end = most if ahead > 0.0 else least
     far, lost = abs(ahead), length * yields * abs(end - force)
     per = 1.0 / presliding

@@ -44,6 +44,7 @@ from laboratories.table.record import (
     PLAYED,
     PRESENT,
     ROWS,
+    TABLE_BRISTLES,
     TABLE_GAIN,
     TableLab,
 )
@@ -91,7 +92,7 @@ def build(
         limits += [part.friction_asymmetry, part.friction_drop, part.friction_speed]
     limits += [on_damper.presliding, *behind, on_damper.stop_exponent, on_damper.stop_damping]
     limits += [on_damper.force_limit_sharpness]
-    limits += [*valve(table, on_table), on_damper.asymmetry, *behind_coupling]
+    limits += [*valve(table, on_table), on_damper.asymmetry, *behind_coupling, on_table.presliding]
     return TableLab(
         taps,
         walk,
@@ -187,7 +188,9 @@ def walk_on(lab: TableLab, border: int) -> tuple[int, int]:
     columns, limits, state, last = lab.columns, lab.limits, lab.state, lab.walk.shape[0] - 1
     size = columns.shape[1] - INPUTS
     after, play, brush = size + 1, size + INPUTS + PLAYED, size + INPUTS + BRISTLES
-    begun, played, bristles = delay.delayed(lab.history, lab.taps, border), state[play], state[brush]
+    bearing = size + INPUTS + TABLE_BRISTLES
+    begun, played = delay.delayed(lab.history, lab.taps, border), state[play]
+    bristles = state[brush], state[bearing]
     half, i, end = 0.5 * limits[PLAY], 0, border
     for level in range(last + 1):
         i, end = lab.walk[level, border, 0], lab.walk[level, border, 1]
@@ -201,7 +204,7 @@ def walk_on(lab: TableLab, border: int) -> tuple[int, int]:
         carry(columns[i], state, lab.free)
         if limits[PRESENT] == 0.0:
             break
-        state[brush] = bristles
+        state[brush], state[bearing] = bristles
         resist(columns[i], lab, lab.lengths[i])
         if level == last or steady(columns[i], lab, lab.lengths[i], bristles, played, wanted - begun):
             break

@@ -28,10 +28,11 @@ ASYMMETRY = 30  # of the damper's dashpot
 # of a mass behind a coupling: itself kg, spring 1/s² and dashpot 1/s over it, a half of the coupling's play m, and the
 # whole mass over the first one
 SECOND, COUPLING, COUPLED_RATE, GAP, WHOLE = 31, 32, 33, 34, 35
+TABLE_PRESLIDING = 36  # m, of the table's friction
 
 # places in `state` behind the states and inputs
-PLAYED, LAST_VELOCITY, BRISTLES, APART, APART_RATE, HELD = range(6)
-MEMORIES = 6
+PLAYED, LAST_VELOCITY, BRISTLES, APART, APART_RATE, HELD, TABLE_BRISTLES = range(7)
+MEMORIES = 7
 ROWS = 8  # of a column: as many with an oil column as without one, so that they are carried side by side
 
 
@@ -47,9 +48,9 @@ class TableLab(NamedTuple):
     spring: Array  # (stiffness N/m, dashpot N·s/m) of the damper
     limits: Array  # effects that are not in the matrices
     history: Array  # table commands written, newest first
-    # (n + 11,), n = 6, or 8 with an oil column: behind the states the inputs, the command after the play, an ideal
-    # table's last velocity, the bristles' force, and of a mass behind a coupling how far it is ahead of the first one,
-    # the rate of that, and the coupling's force on the first one
+    # (n + 12,), n = 6, or 8 with an oil column: behind the states the inputs, the command after the play, an ideal
+    # table's last velocity, the force of the rail's bristles, of a mass behind a coupling how far it is ahead of the
+    # first one, the rate of that, and the coupling's force on the first one, and what the bearings' bristles brake by
     state: Array
     free: Array  # (ROWS,): the states at a segment's end without g and the table's friction
     learned: Array  # a law of `models.preisach` of the stroke, empty for none

@@ -33,7 +33,7 @@ def levels(interval: float, table: TableEffects, damper: DamperEffects) -> tuple
     if law or not (math.isinf(table.velocity_limit) and math.isinf(damper.second_frequency)):
         return (usual,)
     rubbing = [part for part in (table, damper) if part.friction]
-    if rubbing and damper.presliding == 0.0 and all(dry(part) for part in rubbing):
+    if rubbing and all(dry(part) for part in rubbing):
         return tuple(sorted({1, usual, JUMPS * usual}))
     if rubbing or table.backlash or damper.stop_stiffness:
         return tuple(sorted({1, usual}))
@@ -42,7 +42,7 @@ def levels(interval: float, table: TableEffects, damper: DamperEffects) -> tuple
 
 def dry(part: TableEffects | DamperEffects) -> bool:
     """Whether a friction jumps at a reversal and has one size otherwise."""
-    return part.friction_velocity <= COULOMB and part.friction_drop == 0.0
+    return part.friction_velocity <= COULOMB and part.friction_drop == 0.0 and part.presliding == 0.0
 
 
 @lru_cache(maxsize=KEPT)

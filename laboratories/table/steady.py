@@ -14,7 +14,9 @@ from laboratories.table.record import (
     SHAPE,
     STOP,
     STOP_STIFFNESS,
+    TABLE_BRISTLES,
     TABLE_FRICTION,
+    TABLE_PRESLIDING,
     TABLE_SHAPE,
     TABLE_VELOCITY,
     VELOCITY,
@@ -32,11 +34,17 @@ ROUNDED = 1e-12  # m
 
 @jit
 def steady(
-    columns: Array, lab: TableLab, length: float, bristles: float, played: float, moved: float
+    columns: Array,
+    lab: TableLab,
+    length: float,
+    bristles: tuple[float, float],
+    played: float,
+    moved: float,
 ) -> bool:
     """Whether the forces that `resist` has found hold all over a segment of `length` s.
 
-    `bristles` (N) and `played` (m) are those at its beginning, and `moved` (m) is the way of the table's command.
+    `bristles` (N of the rail, m/s² of the bearings) and `played` (m) are those at its beginning, and `moved` (m) is the
+    way of the table's command.
     """
     limits, state, size = lab.limits, lab.state, columns.shape[0] - INPUTS
     usual = length < 1.001 * SUBSTEP
@@ -48,12 +56,15 @@ def steady(
         return False
     if limits[TABLE_FRICTION] > 0.0:
         base = BASE_RATE if size > BASE else TABLE_RATE
-        if not slides(columns, lab, base, TABLE_SHAPE, limits[TABLE_VELOCITY], usual):
+        bent = state[size + INPUTS + TABLE_BRISTLES] - bristles[1] if limits[TABLE_PRESLIDING] > 0.0 else 0.0
+        if abs(bent) > EVEN * limits[TABLE_FRICTION] or not slides(
+            columns, lab, base, TABLE_SHAPE, limits[TABLE_VELOCITY], usual
+        ):
             return False
     if limits[FRICTION] == 0.0:
         return True
-    bent = state[size + INPUTS + BRISTLES] - bristles
-    if limits[PRESLIDING] > 0.0 and abs(bent) > EVEN * limits[FRICTION]:
+    bent = state[size + INPUTS + BRISTLES] - bristles[0] if limits[PRESLIDING] > 0.0 else 0.0
+    if abs(bent) > EVEN * limits[FRICTION]:
         return False
     return slides(columns, lab, STROKE_RATE, SHAPE, limits[VELOCITY], usual)
 

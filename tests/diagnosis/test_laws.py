@@ -89,6 +89,28 @@ def test_reinforced_concrete_is_found_by_its_layers() -> None:
     assert found.chi < 1.2 * found.reduced.size
 
 
+class Endochronic(Driven):
+    """A column alone that is endochronic, its force in steps of a thousandth of the motion's peak and less."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        z, before, force = 0.0, 0.0, np.empty(TICKS)
+        for tick, x in enumerate(self.inputs):
+            for way in np.diff(np.linspace(before, x, 21)):
+                z += way - abs(way) * z / LIMIT
+            force[tick], before = K * (0.2 * x + 0.8 * z), x
+        self.measured = (force + NOISE * np.random.default_rng(2).standard_normal(TICKS))[:, None]
+
+
+def test_an_endochronic_column_is_yielding_by_that_law() -> None:
+    (found,) = in_best_laws([first_law(Endochronic())])
+    values = found.values["column.yielding"]
+    assert CATALOGUE["column.yielding"].laws[int(values["law"])].name == "endochronic"
+    assert values["loop"] == pytest.approx(1.0, abs=0.03)
+    assert values["yield_displacement"] == pytest.approx(LIMIT, rel=0.03)
+    assert found.chi < 1.2 * found.reduced.size
+
+
 def test_the_recording_with_the_largest_deformation_starts_the_fit_of_a_law() -> None:
     near, far = Driven(), Driven()
     near.inputs = 0.5 * near.inputs
@@ -130,6 +152,7 @@ def test_a_parameter_that_a_law_lacks_is_not_fitted() -> None:
         **{place: {"yield_displacement", *Driven.TRUE} for place in (6, 8, 10)},
         11: {"yield_displacement", "hardening", "exponent"}
         | {"concrete", "axial", "strength", "spalling", "shaft", "focus"},
+        12: {"yield_displacement", "hardening", "exponent", "loop"},
     }
 
 

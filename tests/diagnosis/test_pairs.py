@@ -110,7 +110,9 @@ def test_what_an_impact_makes_vague_counts_less_than_what_shows_before_it(cases:
     assert np.all(vague[: met - 1] == 1.0)
     assert np.all(np.diff(vague, axis=0) >= 0.0)
     assert vague[-1, place] > 10.0
-    assert np.all(vague[:, data.part.signals.index("table_displacement")] == 1.0)  # the stop is not the table's
+    assert np.all(
+        vague[:, data.part.signals.index("table_displacement")] == 1.0
+    )  # the stop is not the table's
     true, wrong = (
         fitting.at(known.data, stop.values | {name: {"factor": 1.1}}, nominal)
         for name in ("damper.gain", "sensor.damper_force.gain")

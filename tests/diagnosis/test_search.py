@@ -49,6 +49,11 @@ ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth
     ("column.yielding", {"yield_displacement": 1.2e-3, "hardening": 0.1}, {"yield_displacement": 0.05}),
     ("damper.force_limit", {"force": 30.0, "law": 1.0, "sharpness": 3.0}, {"force": 0.05, "law": 0.0}),
     ("table.gain", {"factor": 0.93}, {"factor": 0.01}),
+    (
+        "table.friction",
+        {"acceleration": 0.3, "law": 2.0, "presliding": 1e-4},
+        {"acceleration": 0.05, "presliding": 0.1, "law": 0.0},
+    ),
     ("damper.friction", {"force": 3.0}, {"force": 0.05}),
     ("damper.viscous", {"factor": 1.5}, {"factor": 0.05}),
     ("column.hardening", {"share": -0.05}, {"share": 0.1}),

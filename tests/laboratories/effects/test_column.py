@@ -20,6 +20,21 @@ from models.system import ColumnEffects
 from tests.laboratories.effects.histories import DT, SHORT, Array, K, cycles, run_a, specimen_under, tones
 
 
+def test_an_endochronic_column_loads_by_an_exponential_and_unloads_more_steeply() -> None:
+    """With n = 1 and no hardening z = 1 − exp(−δ/δ_y) on the way out, and back dz/dδ = (1 + z)/δ_y at first."""
+    limit = 1e-3
+    path = np.concatenate([np.linspace(0.0, 3e-3, 301)[1:], 3e-3 - np.linspace(0.0, 1e-3, 1001)[1:]])
+    more = ColumnEffects(yield_displacement=limit, hardening=0.0, exponent=1.0, law=12.0, yield_loop=1.0)
+    z = specimen_under(path, more) / (K * limit)
+    assert z[:300] == pytest.approx(1.0 - np.exp(-path[:300] / limit), abs=1e-6)
+    back = (z[300] - z[299]) / (path[300] - path[299]) * limit
+    assert back == pytest.approx(1.0 + z[299], rel=1e-3)
+    half = replace(more, yield_loop=0.5)
+    assert specimen_under(path, half) == pytest.approx(
+        specimen_under(path, replace(half, law=0.0)), rel=1e-12
+    )
+
+
 def last_loop(path: Array, force: Array, frequency: float) -> float:
     """Energy lost in the last cycle."""
     steps = round(1.0 / (frequency * SHORT)) + 1

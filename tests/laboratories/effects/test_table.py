@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp, trapezoid
+from scipy.optimize import brentq
 
 from common.errors import InputError
 from common.plan.laboratory_tables import Damper, ShakingTable
@@ -252,6 +253,31 @@ def test_table_friction_depends_on_direction_and_speed() -> None:
         rubbing = 0.5 * share * (1.0 - 0.4 * (1.0 - math.exp(-speed / 0.01)))
         behind = (1.4 * omega * speed + rubbing) / omega**2
         assert way * (ramp[-1] - got[-1, Y]) == pytest.approx(behind, rel=1e-6)
+
+
+@pytest.mark.parametrize("oil", [math.inf, 25.0])
+@pytest.mark.parametrize("share", [0.5, -0.9])
+def test_a_bearing_with_presliding_gives_way_below_its_friction(share: float, oil: float) -> None:
+    """At rest its bristles carry what the loop pulls: ω²·(u − y) = ±F·(1 − exp(−|y|/s₀))."""
+    omega, friction, presliding = 2.0 * math.pi * 15.0, 1.0, 1e-4
+    command = share * friction / omega**2
+    table = ShakingTable(delay=0.0, damping_ratio=5.0)  # so slow that it does not swing over
+    more = TableEffects(friction=friction, presliding=presliding, oil_frequency=oil)
+    got = run_b(np.full(2000, command), table=table, damper=STILL, table_effects=more)
+    rest = brentq(
+        lambda y: omega**2 * (abs(command) - y) - friction * (1.0 - math.exp(-y / presliding)), 0.0, 1.0
+    )
+    assert got[-1, Y] == pytest.approx(math.copysign(rest, share), rel=0.01)
+
+
+def test_a_bearing_with_stiff_bristles_sticks_and_slides_as_coulombs_friction_does() -> None:
+    command = tones(2000, size=2e-3)
+    sticking = run_b(command, damper=STILL, table_effects=TableEffects(friction=0.5))
+    bristled = run_b(command, damper=STILL, table_effects=TableEffects(friction=0.5, presliding=1e-9))
+    # dry friction has shorter segments at its jumps
+    assert np.max(np.abs(bristled - sticking)[:, Y]) < 1e-3 * np.max(np.abs(sticking[:, Y]))
+    loose = run_b(command, damper=STILL, table_effects=TableEffects(friction=0.5, presliding=1e-3))
+    assert np.max(np.abs(loose - sticking)[:, Y]) > 0.01 * np.max(np.abs(sticking[:, Y]))
 
 
 def test_a_learned_force_of_the_tables_motion_acts_against_it() -> None:

@@ -17,6 +17,9 @@ with yield displacement δ_y, hardening α and exponent n. The parameter `law` c
     10  the same with a trilinear skeleton
     11  reinforced concrete: a section of layers of concrete and bars under an axial force, and an elastic shaft; R₀ of
         the bars is the exponent, and what leans on the column makes the hardening negative
+    12  the endochronic law (K. C. Valanis, Archives of Mechanics 23 (1971), 517-551; Z. P. Bažant and P. D. Bhat, J.
+        Eng. Mech. Div. ASCE 102 (1976), 701-722), dz/dδ = (1 − |z|ⁿ·sgn(z·dδ)) / δ_y, which unloads by up to twice the
+        elastic stiffness: with `loop` β in general Bouc and Wen's 1 − |z|ⁿ·(1 − β + β·sgn(z·dδ)), where 0.5 is law 0
 
 Laws 5 to 10 may be stronger on one side, by `asymmetry`: concrete that cracks, or bars on one side only.
 
@@ -98,9 +101,10 @@ EFFECT = sets(
     },
     further={
         "law": which_law(
-            11.0,
+            12.0,
             "0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented, 4 trilinear, 5 pinched, 6 both, "
-            "7 and 8 as these with the corner by the peak, 9 and 10 by its rest, 11 layers of concrete and bars",
+            "7 and 8 as these with the corner by the peak, 9 and 10 by its rest, 11 layers of concrete and bars, 12 "
+            "endochronic",
         ),
         "unloading": Parameter(
             "unloading",
@@ -186,6 +190,16 @@ EFFECT = sets(
         "focus": of_layers(
             "focus", 2.0, 0.1, 100.0, "strain in tension over that of yielding bars to which concrete unloads"
         ),
+        "yield_loop": Parameter(
+            "loop",
+            "",
+            null=0.5,
+            least=0.01,
+            most=3.0,
+            sizes=(),
+            says="how wide the loop of law 12 is: 0.5 unloads with the elastic stiffness, 1 with up to twice it",
+            shape=True,
+        ),
     },
     laws=(
         Law("Bouc and Wen", {"hardening": 0.05, "exponent": 2.0}, "bouc_wen", {"exponent": "n"}),
@@ -214,6 +228,12 @@ EFFECT = sets(
             {"hardening": 0.0, "exponent": 16.0, **LAYERS},
             "layered",
             {"exponent": "sharpness"},
+        ),
+        Law(
+            "endochronic",
+            {"hardening": 0.05, "exponent": 2.0, "loop": 1.0},
+            "bouc_wen",
+            {"exponent": "n", "loop": "beta"},
         ),
     ),
     says="the specimen yields",

@@ -19,11 +19,9 @@ reversal alone.
 
 from __future__ import annotations
 
-from laboratories.effects.effect import Law, Parameter
-from laboratories.effects.friction import FURTHER, VELOCITY, laws
-from laboratories.effects.laws import sets, which_law
-
-COULOMB = {"velocity": 1e-6}
+from laboratories.effects.effect import Parameter
+from laboratories.effects.friction import BRISTLED, VELOCITY, bristled
+from laboratories.effects.laws import sets
 
 EFFECT = sets(
     "damper",
@@ -32,33 +30,8 @@ EFFECT = sets(
         "friction": Parameter("force", "N", null=0.0, least=0.0, most=200.0, sizes=(0.3, 1.0, 3.0, 10.0)),
         "friction_velocity": VELOCITY,
     },
-    further=FURTHER
-    | {
-        "": which_law(
-            3.0,
-            "0 the same in both directions and at all speeds, 1 by direction and speed, 2 by direction and with "
-            "presliding, 3 all of it",
-        ),
-        "presliding": Parameter(
-            "presliding",
-            "m",
-            null=0.0,
-            least=1e-6,
-            most=0.005,
-            sizes=(3e-05, 0.0005),
-            says="distance over which the force of laws 2 and 3 approaches its size after a reversal",
-            shape=True,
-        ),
-    },
-    laws=(
-        *laws(COULOMB),
-        Law("with presliding", {"presliding": 1e-4, "asymmetry": 0.0}, fixed=COULOMB),
-        Law(
-            "by direction and speed, with presliding",
-            {"presliding": 1e-4, "asymmetry": 0.0, "drop": 0.1, "speed": 0.02},
-            fixed=COULOMB,
-        ),
-    ),
+    further=BRISTLED,
+    laws=bristled(),
     says="Coulomb friction of the guide rail",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083-1138",
 )
