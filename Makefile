@@ -8,7 +8,7 @@ FAULT_TESTS := tests/faults tests/system/faults tests/system/test_recording_faul
 # the tests start hundreds of interpreters, which find this checkout compiled, whatever the user's shell says of bytecode
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup run test tested check slow faults soak matrix opensees fmi cluster docs site benchmark blind clean
+.PHONY: setup run test check slow faults soak matrix opensees fmi cluster docs site benchmark blind clean
 
 setup: $(READY)
 
@@ -29,13 +29,9 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# the checks run beside the tests, which wait now and then
-test: setup
-	$(MAKE) --no-print-directory -j 2 check tested
-
 # kernels that a change has made outdated are compiled once, before every worker would compile each of them; the third
 # worker computes while tests of another one wait for clocks and processes
-tested: setup
+test: setup
 	$(BIN)/python -m simulation.warm
 	$(BIN)/pytest -n 3 --dist worksteal -m "not slow and not faults and not soak"
 
