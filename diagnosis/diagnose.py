@@ -13,7 +13,7 @@ from common.errors import InputError
 from common.plan.kinds import COLUMN
 from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import logger, report, where
+from diagnosis.findings import filters, logger, report, where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors import readings, staircases
 from diagnosis.findings.sensors.loud_noise import no_noise
@@ -68,19 +68,24 @@ def diagnose(
     # The matrices are small, so that several BLAS threads would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
         found = {
-            role: examine(logger.clocked(record), tell, [*map(logger.clocked, more.get(role, ()))])
+            role: examine(put_right(record), tell, [*map(put_right, more.get(role, ()))])
             for role, record in records.items()
         }
         systems = {role: item.systems(noisy=False)[role] for role, item in found.items()}
         return {
             role: report.build(
                 replace(item, record=among(item.record, systems)),
-                [among(logger.clocked(other), systems) for other in validation.get(role, ())],
+                [among(put_right(other), systems) for other in validation.get(role, ())],
                 tell,
                 require,
             )
             for role, item in found.items()
         }
+
+
+def put_right(record: Record) -> Record:
+    """A record on the clock of its commands, with what its logger did to its readings and its map does not state."""
+    return filters.filtered(logger.clocked(record))
 
 
 def among(record: Record, systems: Mapping[str, System]) -> Record:
@@ -108,10 +113,9 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     steps = readings.resolutions(record, rounded) | logger.interpolated(parts)
     datas, verdicts = [], []
     hidden: dict[str, Stairs] = {}
-    # s, delay that a logger added to all channels, and its standard deviation; None without a logger.
-    late = None if record.stated is None else (logger.common_delay(parts, record, steps), 0.0)
+    late = None if record.stated is None else record.late
     for number, given in enumerate(parts, 1):
-        part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(*late)
+        part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
         tell(part.name, number, len(parts))
         data, verdict = seen(part, further, record, steps)
         if anew := staircases.hidden(verdict.search, record):
@@ -119,7 +123,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
             data, verdict = seen(part, further, record, steps)
         datas.append(data)
         verdicts.append(verdict)
-        late = late and (logger.by_building(verdict) or late)
+        late = late and logger.later(late, verdict, record)
     held = readings.held(record, steps)
     noisy = readings.findings(record, noise(verdicts, sharpest), rounded, steps, logged=late is not None)
     verdicts, noisy = machines_first(record, verdicts, noisy)

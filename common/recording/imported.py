@@ -19,8 +19,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from functools import cached_property
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,20 +62,11 @@ class LoggerFilter:
         s = 2j * math.pi * np.asarray(frequency)
         return np.asarray(np.polyval(above, s) / np.polyval(below, s), dtype=np.complex128)
 
-    @cached_property
+    @property
     def modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """Poles p (1/s) with no negative imaginary part and weights w (1/s): the real part of Σ w/(s − p)."""
-        from scipy import signal
-
-        omega = 2.0 * math.pi * self.cutoff
-        if self.type == "bessel":
-            _, poles, gain = signal.bessel(self.order, omega, analog=True, output="zpk", norm="mag")
-        else:
-            _, poles, gain = signal.butter(self.order, omega, analog=True, output="zpk")
-        apart = poles[:, None] - poles[None, :] + np.eye(poles.size)
-        weights = gain / np.prod(apart, axis=1)
-        upper = poles.imag >= 0.0
-        return poles[upper], np.where(poles.imag > 0.0, 2.0, 1.0)[upper] * weights[upper]
+        poles, weights = _modes(self.type, self.order)
+        return self.cutoff * poles, self.cutoff * weights
 
     def filtered(self, values: Samples, interval: float) -> Samples:
         """A signal (ticks,) after the filter, linear between ticks and constant at its first value before them.
@@ -140,6 +131,11 @@ class ImportedData:
         """What is stated about a signal; `NOTHING_STATED` for one that the map does not name."""
         return self.channels.get(topic, {}).get(name, NOTHING_STATED)
 
+    def with_filter(self, topic: str, name: str, one: LoggerFilter) -> ImportedData:
+        """The same with a filter of a signal's channel."""
+        rows = {**self.channels.get(topic, {}), name: replace(self.channel(topic, name), filter=one)}
+        return replace(self, channels={**self.channels, topic: rows})
+
     def metadata(self) -> dict[str, str]:
         """The values of the metadata record."""
         tables = {
@@ -175,6 +171,22 @@ def exchange_known(run: Run) -> bool:
     """Whether a recording tells which message was used when; without numbers or stamps the link cannot be judged."""
     names = {name for columns in run.columns.values() for name in columns}
     return any(name.endswith("_seq") or name.endswith("_one_way") for name in names)
+
+
+@cache
+def _modes(kind: str, order: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Poles and weights of a filter whose cutoff is 1 Hz."""
+    from scipy import signal
+
+    omega = 2.0 * math.pi
+    if kind == "bessel":
+        _, poles, gain = signal.bessel(order, omega, analog=True, output="zpk", norm="mag")
+    else:
+        _, poles, gain = signal.butter(order, omega, analog=True, output="zpk")
+    apart = poles[:, None] - poles[None, :] + np.eye(poles.size)
+    weights = gain / np.prod(apart, axis=1)
+    upper = poles.imag >= 0.0
+    return poles[upper], np.where(poles.imag > 0.0, 2.0, 1.0)[upper] * weights[upper]
 
 
 def _plain(channel: ImportedChannel) -> dict[str, Any]:

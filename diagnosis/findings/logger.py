@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from common.recording.imported import ImportedChannel, LoggerFilter
 from diagnosis.findings.certainty.intervals import FOREIGN, covariance
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors import readings
@@ -17,12 +18,9 @@ from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.parts import ALIKE, LATE, LaboratoryPart, Part
-from diagnosis.recorded.record import LEAST_TICKS, Record
+from diagnosis.recorded.record import LEAST_TICKS, NOT_LATE, Delay, Late, Record
 from diagnosis.signals import clock
 
-# Share of a reading's rms that a nominal model leaves, from which on an effect is at work: noise, a hum of 1 % of the
-# peak and a converter together leave up to 4 %.
-SPOILT = 0.05
 TOLD = 4e-3  # of a reading's gain: the report shows two digits, and less is no matter for a test
 
 
@@ -32,27 +30,19 @@ def interpolated(parts: Sequence[Part]) -> dict[str, float]:
     return {part.signals[0]: math.sqrt(12.0) * part.blur for part in grounds if part.blur > 0.0}
 
 
-def common_delay(parts: Sequence[Part], record: Record, steps: Mapping[str, float]) -> float:
-    """Delay (s) of a logger by which every channel of several laboratories is late at least, 0 where one is not.
+def later(late: Late, verdict: PartVerdict, record: Record) -> Late:
+    """Delays of a logger, of which a part that was judged may tell that of forces.
 
-    A filter or a logger delays all of its channels; an effect delays those of one machine. A laboratory that its
-    nominal model misses by far tells nothing of the logger, as long as another one does.
+    Where no two laboratories tell by how much their other readings are late, these are as late as the forces.
     """
-    fits = nominal(parts, record, steps)
-    if len(fits) < 2:
-        return 0.0
-    near = [missed(fit) < SPOILT for _, fit in fits]
-    found = [
-        delay
-        for (lab, fit), yes in zip(fits, near, strict=True)
-        if yes or not any(near)
-        for delay in lab.late(fit.z)
-    ]
-    return max(0.0, min(found, default=0.0))
+    force = by_building(verdict)
+    if force is None:
+        return late
+    return Late(force, late.motion if len(record.labs) > 1 else force)
 
 
-def by_building(verdict: PartVerdict) -> tuple[float, float] | None:
-    """Delay (s) and its standard deviation of a logger by the forces of a building; None where it tells nothing.
+def by_building(verdict: PartVerdict) -> Delay | None:
+    """Delay of a logger by the forces of a building; None where it tells nothing.
 
     A building tells the delay apart from that of any machine, but only as surely as its own formula is right, and
     nothing where its gap has no cause. No other part tells it.
@@ -82,7 +72,7 @@ def nominal(
     parts: Sequence[Part], record: Record, steps: Mapping[str, float]
 ) -> list[tuple[LaboratoryPart, Fit]]:
     """Laboratories behind a logger of any delay, each with the fit of its nominal model."""
-    labs = [part.logged(0.0, spread=LATE) for part in parts if isinstance(part, LaboratoryPart)]
+    labs = [part.logged(NOT_LATE, LATE) for part in parts if isinstance(part, LaboratoryPart)]
     return [(lab, fitting.fit(residuals.prepare(lab, record, steps), {})) for lab in labs]
 
 
@@ -95,19 +85,27 @@ def rates(lab: LaboratoryPart, fit: Fit) -> list[clock.Rate]:
     return [one for one in found if one is not None]
 
 
-def missed(fit: Fit) -> float:
-    """Largest share of a reading's rms that a fit leaves."""
-    left = fit.data.residual(hypothesis.lay(fit.data, fit.z, fit.values))
-    there = fit.data.part.present
-    level, rest = (
-        np.sqrt(np.sum(np.square(np.where(there, x, 0.0)), axis=0)) for x in (fit.data.part.measured, left)
-    )
-    return float(np.max(rest[level > 0.0] / level[level > 0.0], initial=0.0))
-
-
 def remarks(found: Diagnosis) -> list[str]:
-    """Sentences on readings of an import that are late alike or of a fast or slow clock, and on those with a gain."""
-    return [*timed(found), *gained(found)]
+    """Sentences on what the logger of an import did to readings: filters, delays, a fast or slow clock, gains."""
+    return [*passed(found), *timed(found), *gained(found)]
+
+
+def passed(found: Diagnosis) -> list[str]:
+    """A sentence for each kind of filter of the logger that the import map does not state."""
+    alike: dict[tuple[str, int], dict[str, LoggerFilter]] = {}
+    for (_, name), one in found.record.passed.items():
+        alike.setdefault((one.type, one.order), {})[name] = one
+    return [
+        f"{' and '.join(those)} passed a low-pass filter of the data logger that the import map does not state: "
+        f"about {kind.title()}, of order {order} and {span([one.cutoff for one in those.values()])} Hz, late by "
+        f"{span([1e3 * ImportedChannel(one).late for one in those.values()])} ms. It was taken into account; state it."
+        for (kind, order), those in alike.items()
+    ]
+
+
+def span(values: Sequence[float]) -> str:
+    """Values in three digits, from the least to the largest."""
+    return " to ".join(dict.fromkeys(f"{value:.3g}" for value in (min(values), max(values))))
 
 
 def gained(found: Diagnosis) -> list[str]:

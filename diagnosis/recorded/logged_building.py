@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from diagnosis.recorded.nuisances import LoggedForce
 from diagnosis.recorded.parts import ALIKE, CALIBRATED, LATE, UNLIKE, Building
+from diagnosis.recorded.record import Delay
 from diagnosis.signals import alike
 from diagnosis.signals.earlier import earlier
 from loop.nominal import partition
@@ -29,7 +31,7 @@ def logged(building: Building) -> LoggedBuilding | None:
     if not building.whole:
         return None
     plain = LoggedBuilding(building)
-    if not building.linear or len(alike.treatments(building.channels)) == 1:
+    if not (building.linear and building.treated):
         return plain
     behind = LoggedBuilding(building, behind=True)
     return plain if before_master(plain.left(), behind.left()) else behind
@@ -86,9 +88,30 @@ class LoggedBuilding(Building):
         self._ground[0, :-1] = rows[:, storeys]
         self._inputs = position, rows[:, storeys + 1], rows[:, storeys + 2 :]
 
-    def left(self) -> Array:
-        """What the nominal building leaves of the balance, (ticks, storeys) N."""
-        return self.measured - self.predict(System(self._plan))
+    def left(self, system: System | None = None) -> Array:
+        """What a building leaves of the balance, the nominal one where none is given, (ticks, storeys) N."""
+        return self.measured - self.predict(system or System(self._plan))
+
+    def forces_demanded(self, *, used: bool) -> tuple[Array, Array, Array]:
+        """What recorded forces are in the balance, and what the building's motion demands of them, (ticks, 1) N.
+
+        That is the own laboratory's force, or with `used` those of the others too, at the storey where they are
+        largest. The third are slopes of what is demanded over the building's parameters, (ticks, 1, parameters).
+        """
+        position, force, others = self._inputs
+        less = copy.copy(self)
+        less._inputs = position, 0.0 * force, 0.0 * others if used else others
+        system = System(self._plan)
+        left = self.left(system)
+        forces = left - less.left(system)
+        storey = [int(np.argmax(np.sum(np.square(forces), axis=0)))]
+        own = [one for one in self.nuisances if not one.of_record]
+        slopes = [left[:, storey] - self.left(one.moved(system, 1.0))[:, storey] for one in own]
+        return (
+            forces[:, storey],
+            (forces - left)[:, storey],
+            np.stack([*slopes, CALIBRATED * forces[:, storey]], axis=2),
+        )
 
     @property
     def shortest(self) -> float:
@@ -127,12 +150,12 @@ class LoggedBuilding(Building):
         """The step of the balance where the force is rounded to one of `steps`, by signal."""
         return {BALANCE: self._scale * steps[self._force]} if self._force in steps else {}
 
-    def late(self, z: Array, sure: Array) -> tuple[float, float] | None:
-        """Delay (s) of the logger that recorded the force and its standard deviation; None without such a force.
+    def late(self, z: Array, sure: Array) -> Delay | None:
+        """Delay of the logger that recorded the force; None without such a force.
 
         `z` and `sure` (nuisances,) are the values of a fit and their standard deviations, in tolerances.
         """
         for one, value, by in zip(self.nuisances, z, sure, strict=True):
             if isinstance(one, LoggedForce) and one.parameter == "delay":
-                return one.about + float(value) * one.tolerance, float(by) * one.tolerance
+                return Delay(max(0.0, one.about + float(value) * one.tolerance), float(by) * one.tolerance)
         return None

@@ -58,7 +58,7 @@ class RecordedLoop:
         known = {
             name: one
             for lab in labs
-            for name, one in zip(lab.measured, channels(self.record, lab), strict=True)
+            for name, one in zip(lab.measured, channels(self.record.stated, lab), strict=True)
         }
         return {name: known.get(name, NOTHING_STATED) for name in self.names}
 

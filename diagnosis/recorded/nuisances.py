@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from common.plan.plan import Plan
-from common.recording.imported import NOTHING_STATED, ImportedChannel
+from common.recording.imported import NOTHING_STATED, ImportedChannel, ImportedData
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.record import Record
 from models.system import System
@@ -137,12 +137,16 @@ def movable(value: Any, tolerance: float) -> bool:
     return tolerance > 0.0 and bool(np.all(np.isfinite(values)) and np.all(values != 0.0))
 
 
-def channels(record: Record, lab: RecordedLaboratory) -> tuple[ImportedChannel, ...]:
-    """The stated properties of the logger's channels of a laboratory; neutral ones where rths recorded the test."""
-    stated = record.stated
+def channels(stated: ImportedData | None, lab: RecordedLaboratory) -> tuple[ImportedChannel, ...]:
+    """The properties of the logger's channels of a laboratory; neutral ones where rths recorded the test itself."""
     if stated is None:
         return (NOTHING_STATED,) * len(lab.measured)
     return tuple(stated.channel(lab.role, name) for name in lab.kind.channels.names)
+
+
+def nothing_stated(mapped: ImportedData | None, lab: RecordedLaboratory) -> bool:
+    """Whether the import map states neither a filter nor a delay for any channel of a laboratory."""
+    return all(one.filter is None and one.delay == 0.0 for one in channels(mapped, lab))
 
 
 def calibrations(

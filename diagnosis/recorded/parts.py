@@ -22,10 +22,11 @@ from diagnosis.recorded.nuisances import (
     Nuisance,
     calibrations,
     channels,
+    nothing_stated,
     nuisances,
     of_building,
 )
-from diagnosis.recorded.record import Record
+from diagnosis.recorded.record import Late, Record
 from diagnosis.signals import pieces
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
@@ -139,7 +140,8 @@ class LaboratoryPart:
         self.measured, self.present = outputs(record, self.signals)
         machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]
         names = tuple(name for machine in machines for name in machine.parameters)
-        self.channels = channels(record, lab)
+        self.channels = channels(record.stated, lab)
+        self.free = nothing_stated(record.mapped, lab)
         self._interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)
@@ -265,37 +267,26 @@ class LaboratoryPart:
             result.anew = self.anew[(self.anew[:, 0] < ticks - 2 * REACH) | (self.anew[:, 0] == 0)]
         return result
 
-    def logged(self, delay: float, unsure: float = 0.0, spread: float | None = None) -> LaboratoryPart:
-        """The same laboratory with readings from a logger that delayed other channels by `delay` ± `unsure` s.
+    def logged(self, late: Late, spread: float | None = None) -> LaboratoryPart:
+        """The same laboratory with readings from a logger that delayed forces and other channels.
 
         What a logger does to one channel it mostly does to all, to forces as to the others, which have amplifiers of
         their own; `spread` is the standard deviation of their delays, s. Where a delay, a filter or a calibration is
         stated for a channel, that is not changed.
         """
-        names, about = self.lab.kind.channels.names, max(0.0, delay)
-        late: tuple[LoggedReadings, ...] = ()
-        if not any(channel.filter is not None or channel.delay != 0.0 for channel in self.channels):
-            tolerance = spread or math.hypot(max(ALIKE, UNLIKE * about), unsure)
-            rows = self.lab.kind.channels.measured
-            late = tuple(
-                LoggedReadings("delay", tolerance, self.lab, those, about)
-                for those in (
-                    tuple(row.name for row in rows if (row.unit == "N") == force) for force in (True, False)
-                )
-                if those
+        rows = self.lab.kind.channels.measured
+        groups = ((late.force, True), (late.motion, False)) if self.free else ()
+        delays = tuple(
+            LoggedReadings(
+                "delay", spread or math.hypot(max(ALIKE, UNLIKE * about), unsure), self.lab, those, about
             )
-        if not any(channel.calibration > 0.0 for channel in self.channels):
-            late = (*late, LoggedReadings("gain", CALIBRATED, self.lab, names))
-        return self.replaced(nuisances=(*self.nuisances, *late))
-
-    def late(self, z: Array) -> list[float]:
-        """Delays (s) of the logger's groups of channels, at values z (nuisances,) of a fit; empty without a logger."""
-        rows = zip(self.nuisances, z, strict=True)
-        return [
-            one.about + float(x) * one.tolerance
-            for one, x in rows
-            if isinstance(one, LoggedReadings) and one.parameter == "delay"
-        ]
+            for (about, unsure), force in groups
+            if (those := tuple(row.name for row in rows if (row.unit == "N") == force))
+        )
+        if any(channel.calibration > 0.0 for channel in self.channels):
+            return self.replaced(nuisances=(*self.nuisances, *delays))
+        gain = LoggedReadings("gain", CALIBRATED, self.lab, self.lab.kind.channels.names)
+        return self.replaced(nuisances=(*self.nuisances, *delays, gain))
 
     def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""
@@ -354,6 +345,7 @@ class Building(Measured):
         read = [record.signals[name] for name in names] or [none, none]
         self._inputs = (read[0], read[1], used)
         self._force = own.kind.channels.force if own else ""
+        self.sources = (self._force, *came) if own else ()  # forces used, the own laboratory's first
         self.linear = plan.structure.columns.model == "linear"
         self._plan, self.whole = plan, record.has(*type(self).signals)
         self._scale = own.kind.coupling(own.plan).scale if own else 1.0
@@ -381,6 +373,11 @@ class Building(Measured):
         """Displacement, velocity and acceleration of every storey."""
         rows = replay.building(system, self._ground, *self.forces(system))
         return np.column_stack([rows[name] for name in type(self).signals])
+
+    @property
+    def treated(self) -> bool:
+        """Whether filters or delays of a logger differ between its motion, the ground's and the forces."""
+        return len({(one.filter, one.delay) for one in self.channels}) > 1
 
     @property
     def ground(self) -> Array:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from common.errors import InputError
 from common.plan.plan import Plan, ideal
 from common.plan.read import parse
 from common.recording.holds import before, holds
-from common.recording.imported import ImportedData, imported
+from common.recording.imported import ImportedData, LoggerFilter, imported
 from common.recording.run import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING
@@ -32,6 +34,23 @@ from models.system import System
 MASTER_FIRST = ("master", "slave")
 SAME = 0.9  # share of the forces used that are values of a reading, from which on all are
 LEAST_TICKS = 50  # without which nothing is judged: 0.1 s at 2 ms, and fewer ticks than a correlation needs
+
+
+class Delay(NamedTuple):
+    """A delay and its standard deviation, s."""
+
+    about: float = 0.0
+    unsure: float = 0.0
+
+
+class Late(NamedTuple):
+    """By how much channels of a logger are late that measure a force, and the others, beside their filters."""
+
+    force: Delay = Delay()
+    motion: Delay = Delay()
+
+
+NOT_LATE = Late()
 
 
 @dataclass(frozen=True)
@@ -65,11 +84,22 @@ class Record:
     labs: tuple[RecordedLaboratory, ...] = ()  # the laboratories that it shows, the master's first
     held: float | None = None  # test time (s) of the first hold, before which it ends; None without a hold
     fast: float = 0.0  # rate by which the clock of its readings was fast before they were put right
+    late: Late = NOT_LATE  # by which a logger delays all channels of a kind
+    # filters of channels that its import map does not state, by topic and name
+    passed: Mapping[tuple[str, str], LoggerFilter] = field(default_factory=dict)
+
+    @cached_property
+    def mapped(self) -> ImportedData | None:
+        """The properties of the logger's channels that the import map states, None where rths recorded the test."""
+        return imported(self.run)
 
     @cached_property
     def stated(self) -> ImportedData | None:
-        """The stated properties of the logger's channels, None where rths recorded the test itself."""
-        return imported(self.run)
+        """The properties of the logger's channels that the import map states, with the filters that were found."""
+        said = self.mapped
+        for (topic, name), one in self.passed.items():
+            said = said and said.with_filter(topic, name, one)
+        return said
 
     @property
     def static(self) -> bool:

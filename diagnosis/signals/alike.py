@@ -11,11 +11,6 @@ from diagnosis.signals.earlier import earlier
 from models.registry import Array
 
 
-def treatments(channels: Sequence[ImportedChannel]) -> set[tuple[LoggerFilter | None, float]]:
-    """The different pairs of filter and delay (s) that are stated for channels, each neither where none is."""
-    return {(one.filter, one.delay) for one in channels}
-
-
 def alike(columns: Array, stated: Sequence[ImportedChannel], late: float, interval: float) -> Array:
     """Series (ticks, columns) behind the filters stated for any of them, each once, and late by `late` s.
 

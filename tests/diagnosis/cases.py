@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from common.errors import InterlockError, RthsError
 from common.plan import read as plans
 from common.plan.plan import Plan
 from common.reality import reality
+from common.recording.imported import IMPORT
 from common.recording.reader import read
 from common.terminal import cli
 from diagnosis.fits import residuals
@@ -41,6 +42,7 @@ JITTERED = (  # nominal parameters that no laboratory meets exactly
     ("damper", "mass"),
 )
 TOLERANCE = 0.02
+UNKNOWN_TO_A_LOGGER = ("damper_force_used", "column_target", "table_target")
 
 Effects = Mapping[str, Mapping[str, float]]
 
@@ -83,6 +85,21 @@ def lab_b(whole: Record) -> LaboratoryPart:
     """The slave's laboratory of a record as a part."""
     assert whole.other is not None
     return LaboratoryPart(whole, whole.other)
+
+
+def imported(whole: Record, change: Callable[[Array], Array] = lambda x: x, unit: str = "") -> Record:
+    """The record as an import of what a logger made of every reading, or of those in a unit.
+
+    It holds no targets and no force used.
+    """
+    read = {name for lab in whole.labs for name in lab.measured if unit in ("", whole.unit(name))}
+    signals = {
+        name: change(values) if name in read else values
+        for name, values in whole.signals.items()
+        if name not in UNKNOWN_TO_A_LOGGER
+    }
+    metadata = whole.run.metadata | {IMPORT: {"data": "measurements.csv"}}
+    return replace(whole, signals=signals, run=replace(whole.run, metadata=metadata))
 
 
 class Cases:

@@ -13,8 +13,7 @@ from diagnosis.recorded.record import Record
 from diagnosis.signals import clock
 from diagnosis.signals.noise import quantum_between
 from models.registry import Array
-from tests.diagnosis.cases import Cases
-from tests.diagnosis.test_logger import imported
+from tests.diagnosis.cases import Cases, imported
 
 INTERVAL = 0.002
 TICKS = 10_000

@@ -27,7 +27,7 @@ from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.loop import RecordedLoop
 from diagnosis.recorded.parts import Building
-from diagnosis.recorded.record import Record
+from diagnosis.recorded.record import Delay, Late, Record
 from diagnosis.report.records import HowFar
 from diagnosis.signals import alike
 from diagnosis.signals.earlier import earlier
@@ -87,7 +87,8 @@ def test_a_building_without_a_cause_says_nothing_of_its_logger(cases: Cases) -> 
 def test_readings_without_a_delay_cost_little_where_a_building_hardly_tells_one(cases: Cases) -> None:
     part = lab_a(whole := cases.record())
     surely, hardly = (
-        fitting.fit(residuals.prepare(part.logged(1e-3, unsure), whole), {}).prior for unsure in (0.0, 6e-4)
+        fitting.fit(residuals.prepare(part.logged(Late(late, late)), whole), {}).prior
+        for late in (Delay(1e-3), Delay(1e-3, 6e-4))
     )
     assert hardly < 0.6 * surely  # (0.5 ms)² of 0.25 + 0.36, of which the actuator's own delay bears a part
 

@@ -2,46 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import signal
 
-from common.recording.imported import IMPORT
 from diagnosis.diagnose import examine
-from diagnosis.findings import logger, report
+from diagnosis.findings import report
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
-from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
-from diagnosis.recorded.record import Record
 from models.registry import Array
 from models.system import System
-from tests.diagnosis.cases import STRONGEST, Cases, lab_a, lab_b
+from tests.diagnosis.cases import STRONGEST, Cases, imported, lab_a, lab_b
 
-UNKNOWN_TO_A_LOGGER = ("damper_force_used", "column_target", "table_target")
 FILTER = signal.butter(4, 100.0, fs=500.0)  # before the converter, Hz
-FILTERED = 2.613 / (2.0 * 500.0 * np.tan(np.pi * 100.0 / 500.0))  # s, by which it delays slow motion
 FRICTION = {"column.friction": {"force": 900.0}}
-
-
-def imported(whole: Record, change: Callable[[Array], Array] = lambda x: x) -> Record:
-    """The record as an import of what a logger made of every reading; it holds no targets and no force used."""
-    read = {name for lab in whole.labs for name in lab.measured}
-    signals = {
-        name: change(values) if name in read else values
-        for name, values in whole.signals.items()
-        if name not in UNKNOWN_TO_A_LOGGER
-    }
-    metadata = whole.run.metadata | {IMPORT: {"data": "measurements.csv"}}
-    return replace(whole, signals=signals, run=replace(whole.run, metadata=metadata))
-
-
-def filtered(values: Array) -> Array:
-    """A reading behind the logger's low-pass filter."""
-    return np.asarray(signal.lfilter(*FILTER, values - values[0]) + values[0])
 
 
 def hum(values: Array) -> Array:
@@ -57,35 +34,9 @@ def noisy(values: Array) -> Array:
     return np.asarray(values + np.std(values) / 6.0 * noise / np.std(noise))
 
 
-def delay(whole: Record) -> float:
-    """The delay that is found to be common to all channels, s."""
-    return logger.common_delay(parts_of(whole), whole, {})
-
-
 def outcomes(found: Diagnosis) -> dict[str, str]:
     """The outcome of every part by its name."""
     return {verdict.search.data.part.name: verdict.outcome for verdict in found.verdicts}
-
-
-def test_a_filter_before_every_channel_is_a_delay_of_the_logger(cases: Cases) -> None:
-    assert delay(imported(cases.record(), filtered)) == pytest.approx(FILTERED, abs=5e-4)
-    assert delay(imported(cases.record())) < 5e-4
-
-
-def test_a_delay_of_one_laboratory_is_not_the_loggers(cases: Cases) -> None:
-    assert delay(imported(cases.record({"actuator.delay": {"delay": 0.006}}))) < 5e-4
-
-
-def test_a_laboratory_with_an_effect_does_not_hide_the_loggers_delay(cases: Cases) -> None:
-    assert delay(imported(cases.record(FRICTION), filtered)) == pytest.approx(FILTERED, abs=5e-4)
-
-
-def test_a_filter_that_nobody_stated_is_no_effect_and_is_said(cases: Cases) -> None:
-    found = examine(imported(cases.record(), filtered))
-    assert not [name for verdict in found.verdicts for name in verdict.effects]
-    assert set(outcomes(found).values()) <= {"none", "tolerances"}
-    assert [text for text in found.warnings if "data logger's delay" in text]
-    assert found.logger["column_force"][0] == pytest.approx(FILTERED, abs=1e-3)
 
 
 def test_a_gain_of_all_channels_within_their_calibration_is_said(cases: Cases) -> None:

@@ -1,0 +1,198 @@
+"""Filters and delays of the data logger of an import that its map does not state.
+
+What a logger does to one channel it mostly does to all that measure forces, or to all others, while a fault in a
+laboratory delays readings of that laboratory alone. So a filter is one of the logger where readings of several
+laboratories pass it alike, or where the force that the master used did not pass it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from common.recording.imported import NOTHING_STATED, ImportedChannel, LoggerFilter
+from common.roles import MASTER
+from diagnosis.fits.evidence import BEYOND
+from diagnosis.recorded.divided import parts_of
+from diagnosis.recorded.logged_building import LoggedBuilding
+from diagnosis.recorded.parts import ALIKE, Building, LaboratoryPart, Part
+from diagnosis.recorded.record import LEAST_TICKS, Delay, Late, Record
+from diagnosis.signals import low_pass
+from diagnosis.signals.low_pass import Spectra
+
+# Share of a reading's rms that a nominal model leaves, from which on an effect is at work: noise, a hum of 1 % of the
+# peak and a converter together leave up to 4 %.
+SPOILT = 0.05
+ANY_GAIN = 0.1  # relative tolerance of a reading's gain, which says nothing of a filter
+# Share of what a filter gains in a laboratory that another one may lose there: of a delay, a seventh more or less.
+AS_LIKELY = 0.02
+
+
+class Heard(NamedTuple):
+    """Readings of one laboratory that may have passed one filter."""
+
+    role: str  # of the process that it belongs to
+    names: tuple[str, ...]  # of its channels
+    spectra: Spectra
+
+    def gain(self, channel: ImportedChannel) -> float:
+        """By how much less surprising they are behind a filter than with nothing."""
+        nothing, behind = (low_pass.surprise(self.spectra, one) for one in (NOTHING_STATED, channel))
+        return nothing - behind
+
+
+class Candidate(NamedTuple):
+    """The filter or delay of one laboratory."""
+
+    channel: ImportedChannel
+    gain: float
+    of: Heard
+
+    @property
+    def missed(self) -> float:
+        """Largest share of a reading's rms that the nominal model leaves behind it."""
+        return low_pass.missed(self.of.spectra, self.channel)
+
+    def allows(self, other: ImportedChannel) -> bool:
+        """Whether the readings are about as likely behind another one."""
+        own = self.of.gain(self.channel)
+        return self.of.gain(other) > own - max(BEYOND, AS_LIKELY * own)
+
+    def spoken_for(self, several: Sequence[Candidate]) -> bool:
+        """Whether all of several that are late less allow it."""
+        return all(other.allows(self.channel) for other in several if other.channel.late < self.channel.late)
+
+
+class Common(NamedTuple):
+    """A filter or delay of the logger, and what passed it."""
+
+    channel: ImportedChannel = NOTHING_STATED
+    by: tuple[Heard, ...] = ()
+
+
+def filtered(record: Record) -> Record:
+    """An imported record with the filters and delays of its logger that its map does not state."""
+    if record.stated is None or record.static or record.ticks < LEAST_TICKS:
+        return record
+    parts = parts_of(record)
+    labs = [part for part in parts if isinstance(part, LaboratoryPart) and part.free]
+    forces = of_forces(of_laboratories(record, labs, force=True), of_building(record, parts))
+    others = in_common(of_laboratories(record, labs, force=False), forces.channel)
+    late = Late(Delay(forces.channel.delay), Delay(others.channel.delay))
+    return replace(record, passed=by_channel(forces, others), late=late)
+
+
+def of_forces(labs: Sequence[Heard], exact: Sequence[Heard]) -> Common:
+    """The filter of forces: that of the forces that the master used, and of the laboratories where none objects.
+
+    Of `exact` each is such forces by the motion of the building, the likeliest of which count.
+    """
+    said = [(low_pass.roughly(one.spectra), one) for one in exact]
+    first, own = min(said, key=lambda item: item[0].surprise, default=(None, None))
+    if first is None or own is None or first.gain < BEYOND:
+        return in_common(labs)
+    channel = low_pass.likeliest(own.spectra, first.late, BEYOND)
+    agreed = passed(labs, channel)
+    return agreed if channel.filter is None else Common(channel, (own, *agreed.by))
+
+
+def in_common(labs: Sequence[Heard], known: ImportedChannel = NOTHING_STATED) -> Common:
+    """The filter or delay that readings of several laboratories passed, the one `known` where that is as likely.
+
+    The laboratory decides that knows it best, unless it is less likely in one that is late less: what is like a filter
+    in a laboratory makes its readings later still. One that its nominal model misses by far tells nothing of it, as
+    long as another one does.
+    """
+    said = [(low_pass.roughly(one.spectra), one) for one in labs]
+    sure = [
+        Candidate(low_pass.likeliest(one.spectra, item.late, BEYOND), item.gain, one)
+        for item, one in said
+        if item.gain > BEYOND
+    ]
+    if len(sure) < 2:
+        return Common()
+    sure = sorted([item for item in sure if item.missed < SPOILT] or sure, key=lambda item: -item.gain)
+    chosen = next(one for one in sure if one.spoken_for(sure))
+    channel = known if known.filter and chosen.allows(known) else chosen.channel
+    return passed(labs, channel)
+
+
+def passed(labs: Sequence[Heard], channel: ImportedChannel) -> Common:
+    """A filter or delay that readings of laboratories passed; nothing where one's are much less likely behind it."""
+    if any(one.gain(channel) < -BEYOND for one in labs) or not labs:
+        return Common()
+    return Common(channel, tuple(labs))
+
+
+def by_channel(*found: Common) -> dict[tuple[str, str], LoggerFilter]:
+    """The filters by topic and name; channels of a laboratory that share one have the corner that all of them want."""
+    sharing: dict[tuple[str, LoggerFilter], list[Heard]] = {}
+    for channel, one in ((common.channel, one) for common in found for one in common.by):
+        if channel.filter is not None:
+            sharing.setdefault((one.role, channel.filter), []).append(one)
+    result: dict[tuple[str, str], LoggerFilter] = {}
+    for (role, common), several in sharing.items():
+        names = [(role, name) for one in several for name in one.names]
+        result |= dict.fromkeys(names, tuned(several, common))
+    return result
+
+
+def tuned(several: Sequence[Heard], common: LoggerFilter) -> LoggerFilter:
+    """A filter with the corner that readings of a laboratory want, within what channels of a logger differ by.
+
+    Readings that would rather be late by more are late for another reason.
+    """
+
+    def said(channel: ImportedChannel) -> float:
+        return sum(low_pass.surprise(one.spectra, channel) for one in several)
+
+    late, of = ImportedChannel(common).late, low_pass.like(common)
+    best, least = low_pass.latest(said, of, max(late - 2.0 * ALIKE, 0.5 * late), late + 2.0 * ALIKE)
+    near = abs(best.late - late) < ALIKE
+    return best.filter if best.filter and near and least < said(ImportedChannel(common)) - BEYOND else common
+
+
+def of_laboratories(record: Record, labs: Sequence[LaboratoryPart], *, force: bool) -> list[Heard]:
+    """Forces, or else the other readings, of each laboratory that has any."""
+    return [one for part in labs if (one := of_laboratory(record, part, force=force))]
+
+
+def of_laboratory(record: Record, part: LaboratoryPart, *, force: bool) -> Heard | None:
+    """Forces, or else the other readings, of a laboratory; None where none was recorded."""
+    rows = zip(part.signals, part.lab.kind.channels.names, np.ptp(part.measured, axis=0), strict=True)
+    there = {
+        place: name
+        for place, (signal, name, span) in enumerate(rows)
+        if (record.unit(signal) == "N") == force and record.has(signal) and span > 0.0 and place != part.freed
+    }
+    if not there:
+        return None
+    system, places = record.systems[part.role], list(there)
+    true = part.predict(system)[:, places]
+    slopes = [part.predict(one.moved(system, 1.0))[:, places] - true for one in part.nuisances]
+    slopes += [ANY_GAIN * true * (np.arange(len(places)) == own) for own in range(len(places))]
+    interval, read = record.plan.test.interval, part.measured[:, places]
+    spectra = low_pass.spectra(read, true, np.stack(slopes, axis=2), interval)
+    return Heard(part.role, tuple(there.values()), spectra)
+
+
+def of_building(record: Record, parts: Sequence[Part]) -> list[Heard]:
+    """The force of the master's laboratory as the building's motion tells it, and that with the other forces used.
+
+    Empty where the import map states a filter or delay of what goes into it.
+    """
+    found = next((part for part in parts if isinstance(part, Building)), None)
+    if found is None or not (found.whole and found.linear and found.sources) or found.treated:
+        return []
+    interval, view = record.plan.test.interval, LoggedBuilding(found)
+    return [
+        Heard(
+            MASTER,
+            found.sources[: None if used else 1],
+            low_pass.spectra(*view.forces_demanded(used=used), interval, 0.5 / interval),
+        )
+        for used in (False, True)
+    ]

@@ -1,0 +1,209 @@
+"""The low-pass filter that readings of a logger passed, from what they would be without it.
+
+What a model errs by is a part of the residual, band by band of the spectrum, so that only what all frequencies say
+together speaks for a filter. Hypotheses are weighed by Whittle's likelihood of a residual of unknown spectrum:
+
+    2·Σ lines of a band · log(mean square residual of the band) + Σ z²
+
+Source: P. Whittle, Arkiv för Matematik 2 (1953).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.recording.imported import FILTERS, NOTHING_STATED, ImportedChannel, LoggerFilter
+from models.registry import Array
+
+Lines = NDArray[np.complex128]
+
+SHAPES = tuple(itertools.product(FILTERS, range(1, 9)))  # types and orders of filters
+USUAL = 4  # order by which the delay is found before others are tried
+# s, by which a filter delays slow motion: from a quarter of a usual interval to one of the eighth order and 20 Hz.
+LATES = tuple(float(late) for late in np.geomspace(5e-4, 0.04, 10))
+# Hz, lowest frequency that tells of a filter and highest one at which a laboratory moves, and bands between them.
+LOWEST, HIGHEST, BANDS = 0.5, 80.0, 16
+# Independent lines per line of a spectrum behind Hann's window, whose neighbours share energy (F. J. Harris,
+# Proceedings of the IEEE 66 (1978), 51-83).
+OWN = 2.0 / 3.0
+ROUNDS = 2  # of fits, each weighted by what the one before it leaves
+SMALLEST = 1e-4  # of a reading, residual that counts: four digits of a text file
+GOLDEN, DIVISIONS = 0.5 * (math.sqrt(5.0) - 1.0), 7  # which leave a thirtieth of a range
+
+
+class Spectra(NamedTuple):
+    """Spectra of readings of one laboratory."""
+
+    frequency: Array  # (lines,) Hz
+    interval: float  # s
+    read: Lines  # (lines, readings)
+    true: Lines  # (lines, readings) without a filter
+    slopes: Lines  # (lines, readings, parameters) of these over parameters that err by about one
+    starts: NDArray[np.int64]  # (bands,) first line of each band
+
+
+def spectra(read: Array, true: Array, slopes: Array, interval: float, highest: float = HIGHEST) -> Spectra:
+    """Spectra up to `highest` (Hz) of readings as recorded and without a filter (ticks, readings).
+
+    `slopes` (ticks, readings, parameters) are those of the latter over parameters that err by about one.
+    """
+    frequency: Array = np.asarray(np.fft.rfftfreq(len(read), interval), dtype=np.float64)
+    kept = (frequency >= LOWEST) & (frequency <= highest)
+    window = np.hanning(len(read))
+
+    def lines(values: Array) -> Lines:
+        shaped = values * window.reshape(-1, *[1] * (values.ndim - 1))
+        return np.asarray(np.fft.rfft(shaped, axis=0)[kept])
+
+    frequency = frequency[kept]
+    edges = np.geomspace(frequency[0], frequency[-1], BANDS + 1)[:-1]
+    starts = np.unique(np.searchsorted(frequency, edges))
+    return Spectra(frequency, interval, lines(read), lines(true), lines(slopes), starts)
+
+
+def surprise(of: Spectra, channel: ImportedChannel) -> float:
+    """−2·log of how probable the readings are behind a filter or delay, at the best parameters, up to a constant."""
+    return weighed(of, behind(of, channel))
+
+
+def missed(of: Spectra, channel: ImportedChannel) -> float:
+    """Largest share of a reading's rms that is left behind a filter or delay, at the best parameters."""
+    rest, whole = (counts(of) @ level for level in (behind(of, channel).level, means(of, of.read)))
+    return float(np.sqrt(np.max(rest / whole)))
+
+
+class Left(NamedTuple):
+    """What readings differ by from what they would be."""
+
+    level: Array  # (bands, readings) mean square
+    prior: float  # Σ z² of the parameters
+
+
+def behind(of: Spectra, channel: ImportedChannel) -> Left:
+    """What is left of readings behind a filter or delay, at the best parameters."""
+    passed = response(channel, of.frequency, of.interval)[:, None]
+    left, slopes = of.read - passed * of.true, passed[:, :, None] * of.slopes
+    least = SMALLEST**2 * means(of, of.read)
+    found = [Left(np.maximum(means(of, left), least), 0.0)]
+    for _ in range(ROUNDS):
+        z = fitted(left, slopes, np.repeat(found[-1].level, counts(of), axis=0))
+        found.append(Left(np.maximum(means(of, left - slopes @ z), least), float(z @ z)))
+    return min(found, key=lambda one: weighed(of, one))
+
+
+def weighed(of: Spectra, left: Left) -> float:
+    """−2·log of the probability of what is left, and of the parameters."""
+    return 2.0 * OWN * float(np.sum(counts(of) @ np.log(left.level))) + left.prior
+
+
+def response(channel: ImportedChannel, frequency: Array, interval: float) -> Lines:
+    """What `ImportedChannel.through` makes of each frequency (Hz), on straight lines between ticks."""
+    turns = np.exp(-2j * np.pi * frequency * channel.delay)
+    if channel.filter is None:
+        return turns
+    back = np.exp(-2j * np.pi * frequency * interval)
+    poles, weights = (np.concatenate([one, one.conj()]) for one in channel.filter.modes)
+    steps = poles * interval
+    kept = np.exp(steps)
+    ramps = 0.5 * weights / (poles * steps)
+    now, before = ramps * (np.expm1(steps) - steps), ramps * (1.0 + kept * (steps - 1.0))
+    return turns * sum((n + b * back) / (1.0 - k * back) for n, b, k in zip(now, before, kept, strict=True))
+
+
+def counts(of: Spectra) -> NDArray[np.int64]:
+    """Lines of each band (bands,)."""
+    return np.diff(np.append(of.starts, of.frequency.size))
+
+
+def means(of: Spectra, values: Lines) -> Array:
+    """Mean square of each band (bands, readings)."""
+    energy = np.add.reduceat(np.square(values.real) + np.square(values.imag), of.starts)
+    return np.asarray(energy / counts(of)[:, None])
+
+
+def fitted(left: Lines, slopes: Lines, level: Array) -> Array:
+    """Parameters (parameters,) that leave the least, in view of what they err by and of mean squares of the rest."""
+    weights = np.sqrt(2.0 * OWN / level)
+    A = (weights[:, :, None] * slopes).reshape(-1, slopes.shape[2])
+    y = (weights * left).ravel()
+    square = (A.conj().T @ A).real + np.eye(A.shape[1])
+    return np.asarray(np.linalg.solve(square, (A.conj().T @ y).real))
+
+
+Shape = Callable[[float], ImportedChannel]  # a filter by the time (s) that it delays slow motion by
+
+
+def like(one: LoggerFilter) -> Shape:
+    """Filters of the type and order of one."""
+    return shape(one.type, one.order)
+
+
+def shape(kind: str, order: int) -> Shape:
+    """Filters of a type and an order, or delays alone where the order is 0."""
+    if order == 0:
+        return lambda late: ImportedChannel(delay=late)
+    usual = ImportedChannel(LoggerFilter(kind, order, 1.0)).late
+    return lambda late: ImportedChannel(LoggerFilter(kind, order, usual / late))
+
+
+ROUGH = (shape("", 0), *(shape(kind, USUAL) for kind in FILTERS))
+
+
+class Said(NamedTuple):
+    """What readings say of the filter that they passed."""
+
+    late: float  # s, by which it delays slow motion, of those that are tried
+    surprise: float
+    gain: float  # by how much less surprising they are behind it than with nothing
+
+
+def roughly(of: Spectra) -> Said:
+    """The likeliest filter of a usual order, or delay alone."""
+    tried = {late: min(surprise(of, one(late)) for one in ROUGH) for late in LATES}
+    late = min(tried, key=lambda late: tried[late])
+    return Said(late, tried[late], surprise(of, NOTHING_STATED) - tried[late])
+
+
+def likeliest(of: Spectra, late: float, beyond: float) -> ImportedChannel:
+    """The filter behind which readings are least surprising, of those that delay by about `late` s.
+
+    It is a delay alone where none makes them less surprising by more than `beyond`.
+    """
+    place = LATES.index(late)
+    low, high = LATES[max(0, place - 1)], LATES[min(place + 1, len(LATES) - 1)]
+    alone, *filters = (
+        latest(partial(surprise, of), one, low, high)
+        for one in (shape("", 0), *itertools.starmap(shape, SHAPES))
+    )
+    best = min(filters, key=lambda item: item[1])
+    return best[0] if best[1] < alone[1] - beyond else alone[0]
+
+
+def latest(
+    said: Callable[[ImportedChannel], float], of: Shape, low: float, high: float
+) -> tuple[ImportedChannel, float]:
+    """The filter of a shape, late by `low` to `high` s, of which least is said, and that, by golden sections."""
+
+    def of_late(late: float) -> tuple[ImportedChannel, float]:
+        channel = of(late)
+        return channel, said(channel)
+
+    places = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
+    inner = list(map(of_late, places))
+    for _ in range(DIVISIONS):
+        if inner[0][1] < inner[1][1]:
+            high = places[1]
+            places = [high - GOLDEN * (high - low), places[0]]
+            inner = [of_late(places[0]), inner[0]]
+        else:
+            low = places[0]
+            places = [places[1], low + GOLDEN * (high - low)]
+            inner = [inner[1], of_late(places[1])]
+    return min(inner, key=lambda item: item[1])

@@ -1,0 +1,110 @@
+"""Filters and delays of a data logger that its import map does not state."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from common.recording.imported import ImportedChannel, LoggerFilter
+from common.roles import MASTER
+from diagnosis.findings import filters, logger
+from diagnosis.findings.found import Diagnosis
+from diagnosis.fits import fitting, residuals, settling, worth
+from diagnosis.recorded import logged_building
+from diagnosis.recorded.parts import Building
+from diagnosis.recorded.record import NOT_LATE, Record
+from diagnosis.signals import low_pass
+from models.registry import Array
+from tests.diagnosis.cases import STRONGEST, Cases, imported, lab_a, lab_b
+
+INTERVAL = 0.002  # s
+BESSEL = LoggerFilter("bessel", 4, 40.0)
+LATE = ImportedChannel(BESSEL).late
+DIGITAL = signal.butter(4, 100.0, fs=500.0)
+DIGITAL_LATE = 2.613 / (2.0 * 500.0 * np.tan(np.pi * 100.0 / 500.0))  # s, by which it delays slow motion
+FORCES = {("master", "column_force"), ("slave", "damper_force")}
+
+
+def behind_bessel(values: Array) -> Array:
+    """A reading behind an analogue filter."""
+    return BESSEL.filtered(values, INTERVAL)
+
+
+def behind_digital(values: Array) -> Array:
+    """A reading behind a digital filter."""
+    return np.asarray(signal.lfilter(*DIGITAL, values - values[0]) + values[0])
+
+
+def late(found: Record) -> list[float]:
+    """By how much channels of a record are late, as far as filters and delays that were found say, s."""
+    every = {
+        *(one.about for one in found.late),
+        *(ImportedChannel(one).late for one in found.passed.values()),
+    }
+    return sorted(every - {0.0})
+
+
+@pytest.mark.parametrize("channel", [ImportedChannel(BESSEL), ImportedChannel(delay=3.3 * INTERVAL)])
+def test_a_frequency_response_is_that_of_a_channel_on_ticks(channel: ImportedChannel) -> None:
+    frequency, ticks = 7.0, INTERVAL * np.arange(4000)
+    (response,) = low_pass.response(channel, np.array([frequency]), INTERVAL)
+    passed = channel.through(np.sin(2.0 * np.pi * frequency * ticks), INTERVAL)
+    wanted = np.abs(response) * np.sin(2.0 * np.pi * frequency * ticks + np.angle(response))
+    assert passed[1000:] == pytest.approx(wanted[1000:], abs=2e-3)
+
+
+def test_a_filter_of_the_forces_alone_is_found_and_leaves_no_gap(cases: Cases) -> None:
+    found = filters.filtered(imported(cases.record(), behind_bessel, "N"))
+    assert set(found.passed) == FORCES
+    assert late(found) == pytest.approx([LATE], rel=0.03)
+    for lab in (lab_a(found), lab_b(found)):
+        fit = fitting.fit(residuals.prepare(lab.logged(found.late), found), {})
+        assert not worth.is_gap(settling.settled(fit))
+    said = logger.passed(Diagnosis(found))
+    assert said[0].startswith("column_force and damper_force passed a low-pass filter")
+
+
+def test_a_filter_of_all_channels_is_one(cases: Cases) -> None:
+    found = filters.filtered(imported(cases.record(), behind_digital))
+    assert len(set(found.passed.values())) <= 1
+    assert late(found) == pytest.approx([DIGITAL_LATE], abs=3e-4)
+
+
+def test_a_laboratory_with_an_effect_does_not_hide_a_filter(cases: Cases) -> None:
+    rubbing = cases.record({"column.friction": {"force": 900.0}})
+    found = late(filters.filtered(imported(rubbing, behind_bessel)))
+    assert (min(found), max(found)) == pytest.approx((LATE, LATE), rel=0.05)
+
+
+def test_readings_that_are_late_alike_have_no_filter(cases: Cases) -> None:
+    found = filters.filtered(imported(cases.record(), lambda x: np.r_[x[:1], x[:1], x[:-2]]))
+    assert found.passed == {}
+    assert [one.about for one in found.late] == pytest.approx([2 * INTERVAL, 2 * INTERVAL], abs=3e-4)
+
+
+@pytest.mark.parametrize("effects", [{}, {"actuator.delay": {"delay": 0.006}}])
+def test_what_delays_one_laboratory_is_no_filter(cases: Cases, effects: dict[str, dict[str, float]]) -> None:
+    found = filters.filtered(imported(cases.record(effects)))
+    assert (found.passed, found.late) == ({}, NOT_LATE)
+    assert filters.filtered(cases.record(effects)).late == NOT_LATE
+
+
+def behind(whole: Record, seed: int) -> Record:
+    """An import whose force of the master's laboratory alone passed a filter, with noise before it."""
+    noise = np.random.default_rng(seed).standard_normal(whole.ticks)
+    force = behind_bessel(whole.signals["column_force"] + 30.0 * noise)
+    signals = imported(whole).signals | {name: whole.signals[name] for name in ("damper_force_used",)}
+    return replace(imported(whole), signals=signals | {"column_force": force})
+
+
+def test_the_building_tells_the_filter_of_a_force_alone(cases: Cases) -> None:
+    found = filters.filtered(behind(cases.record(duration=STRONGEST), 31))
+    assert list(found.passed) == [(MASTER, "column_force")]
+    assert found.passed[MASTER, "column_force"].cutoff == pytest.approx(BESSEL.cutoff, rel=0.03)
+    view = logged_building.logged(Building(found))
+    assert view is not None
+    assert view.behind
+    assert not worth.is_gap(settling.settled(fitting.fit(residuals.prepare(view, found), {})))
