@@ -150,7 +150,7 @@ def tuned(several: Sequence[Heard], common: LoggerFilter) -> LoggerFilter:
         return sum(low_pass.surprise(one.spectra, channel) for one in several)
 
     late, of = ImportedChannel(common).late, low_pass.like(common)
-    best, least = low_pass.latest(said, of, max(late - 2.0 * ALIKE, 0.5 * late), late + 2.0 * ALIKE)
+    best, least = low_pass.closest(said, of, max(late - 2.0 * ALIKE, 0.5 * late), late + 2.0 * ALIKE)
     near = abs(best.late - late) < ALIKE
     return best.filter if best.filter and near and least < said(ImportedChannel(common)) - BEYOND else common
 

@@ -123,8 +123,7 @@ def gained(found: Diagnosis) -> list[str]:
 
 
 def timed(found: Diagnosis) -> list[str]:
-    """Sentences where all readings of an import are late alike, and where their clock was fast or slow."""
-    late = min((delay for delay, _ in found.logger.values()), default=0.0)
+    """Sentences where readings of an import are late alike, and where their clock was fast or slow."""
     fast = found.record.fast
     said = []
     if fast != 0.0:
@@ -132,10 +131,20 @@ def timed(found: Diagnosis) -> list[str]:
             f"The clock of the readings is {'fast' if fast > 0.0 else 'slow'} by {1e6 * abs(fast):.2g} ppm against "
             "that of the commands: the readings were put onto the clock of the commands."
         )
-    if late < ALIKE:
-        return said
-    return [
-        *said,
-        f"All readings come {1e3 * late:.2g} ms late or more, which is taken for the data logger's delay: state "
-        "filter or delay of the channels in the import map to have effects of such a delay judged.",
+    late = {names: delay for names, delay in least_late(found).items() if delay >= ALIKE}
+    if len(late) > 1:
+        late = {"All readings": min(late.values())}
+    return said + [
+        f"{names} come {1e3 * delay:.2g} ms late or more, which is taken for the data logger's delay: state "
+        "filter or delay of the channels in the import map to have effects of such a delay judged."
+        for names, delay in late.items()
     ]
+
+
+def least_late(found: Diagnosis) -> dict[str, float]:
+    """By how much all readings of forces, and all others, are late at least, s; their names in texts first."""
+    delays: dict[str, list[float]] = {}
+    for name, (delay, _) in found.logger.items():
+        forces = found.record.unit(name) == "N"
+        delays.setdefault("All readings of forces" if forces else "All readings but forces", []).append(delay)
+    return {names: min(those) for names, those in delays.items()}

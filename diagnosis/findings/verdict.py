@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.findings.sensors.own_reading import machine_alone
 from diagnosis.findings.sensors.slow_noise import under_less_noise
 from diagnosis.findings.sites.likely import APART, REST, ranked
+from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit, at_end
 from diagnosis.fits.hypothesis import TOLERANCES
@@ -30,6 +31,9 @@ HALF = 0.5
 # that the true cause is not among the effects named, by outcome.
 TEMPERATURE = 3.0
 DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}
+# Probability of other values of the plan's own parameters where one unknown cause may look the same, over that without:
+# half, as one cause is no less likely than two.
+EITHER = 0.5
 MOST_LEFT = 0.2  # of a gap's rms that effects may leave as an error of such solutions: 4 % of its energy
 # Share of a gap's rms that may be taken for coloured noise where only the residual itself is evidence: a sixth of its
 # energy.
@@ -91,13 +95,32 @@ def with_effects(search: Search) -> PartVerdict:
     same = [tied(search.chosen, other) for other in search.alternatives]
     whole = 1.0 + sum(chances)
     named = (1.0 + sum(value for value, yes in zip(chances, same, strict=True) if yes)) / whole
-    sure = (1.0 - DOUBT[outcome]) * certainty(search)
+    sure = (1.0 - DOUBT[outcome]) * certainty(search) * (EITHER if loop_of_several(search) else 1.0)
     others = tuple(
         (other, sure * value / whole)
         for other, value, yes in zip(search.alternatives, chances, same, strict=True)
         if not yes
     )
     return PartVerdict(search, outcome, sure * named, others, equivalents(search))
+
+
+def loop_of_several(search: Search) -> str:
+    """The transfer system of which several values of the plan are named, empty for none.
+
+    Its loop has more parts than the plan has values of it: a filter in its feedback looks like a shorter time constant
+    with a longer delay, and leaves nothing to be seen.
+    """
+    data, part = search.data, laboratory_of(search.data.part)
+    if part is None:
+        return ""
+    loop = part.lab.site(part.lab.kind.sites[0])
+    own = [(data.catalogue[name], given) for name, given in search.chosen.values.items()]
+    values = [
+        effect
+        for effect, given in own
+        if effect.site == loop and effect.apply(data.system, **given).effects == data.system.effects
+    ]
+    return loop if len(values) > 1 else ""
 
 
 def odds(search: Search) -> list[float]:

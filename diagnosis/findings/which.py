@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.findings.certainty import trust
 from diagnosis.findings.certainty.intervals import Interval, intervals
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import PartVerdict
+from diagnosis.findings.verdict import EITHER, PartVerdict, loop_of_several
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps
@@ -53,7 +53,7 @@ def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Na
     others.sort(key=lambda item: -(item.probability or 0.0))
     first = entry(effects, probability, parameters, 0.0)
     ends = [warning for name, values in fits.items() for warning in at_the_end(catalogue[name], values)]
-    as_good = [sentence for verdict in named for sentence in other_numbers(verdict)]
+    as_good = [sentence for verdict in named for sentence in (*other_numbers(verdict), *other_loops(verdict))]
     return Named((first, *others[:MOST_OTHERS]), (*ends, *as_good))
 
 
@@ -71,7 +71,7 @@ def trusted(
     left = [item for item in named if item.outcome == "partly"]
     shares = [trust.share_named(item.search.explained) for item in left]
     probability = trust.less_by_freedom(min(near, trust.PARTLY.probability(signs), *shares), left)
-    return trust.EITHER * probability if any(map(trust.of_the_plan, left)) else probability
+    return EITHER * probability if any(map(trust.of_the_plan, left)) else probability
 
 
 def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:
@@ -103,6 +103,15 @@ def other_numbers(verdict: PartVerdict) -> list[str]:
         for other in verdict.search.alternatives
         if len(other.names) != len(chosen.names) and tied(chosen, other)
     ]
+
+
+def other_loops(verdict: PartVerdict) -> list[str]:
+    """A sentence where several values of the plan of one transfer system are named."""
+    loop = loop_of_several(verdict.search)
+    return [
+        f"Several values of the plan are named of the {loop}. One other part of its loop, such as a filter in its "
+        "feedback, may look the same: these signals cannot tell them apart."
+    ][: bool(loop)]
 
 
 def described(fit: Fit) -> str:

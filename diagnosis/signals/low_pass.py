@@ -179,14 +179,14 @@ def likeliest(of: Spectra, late: float, beyond: float) -> ImportedChannel:
     place = LATES.index(late)
     low, high = LATES[max(0, place - 1)], LATES[min(place + 1, len(LATES) - 1)]
     alone, *filters = (
-        latest(partial(surprise, of), one, low, high)
+        closest(partial(surprise, of), one, low, high)
         for one in (shape("", 0), *itertools.starmap(shape, SHAPES))
     )
     best = min(filters, key=lambda item: item[1])
     return best[0] if best[1] < alone[1] - beyond else alone[0]
 
 
-def latest(
+def closest(
     said: Callable[[ImportedChannel], float], of: Shape, low: float, high: float
 ) -> tuple[ImportedChannel, float]:
     """The filter of a shape, late by `low` to `high` s, of which least is said, and that, by golden sections."""

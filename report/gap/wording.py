@@ -43,6 +43,7 @@ LEARNED_ON = {
 # Share of the gap from which a site is named in the verdict: it causes more than all others together.
 DOMINANT = 0.5
 LIKELY = 0.5  # probability from which the effects named are more likely the cause than not
+NEAR = 0.1  # share of the first candidate's probability from which on another one is about as probable
 NOTABLE = 1.0  # standard deviations of its tolerance that make a parameter's move worth a word
 
 
@@ -225,9 +226,11 @@ def place(report: Report) -> str:
 
 
 def rivals(report: Report) -> str:
-    """The foremost candidates."""
-    names = [effects(item.effects) for item in once(report.which)[:3]]
-    return joined(names, "or") or "none is named"
+    """The foremost candidates that are about as probable as the first."""
+    first = (report.which[0].probability or 0.0) if report.which else 0.0
+    near = [item for item in once(report.which)[:3] if (item.probability or 0.0) >= NEAR * first]
+    names = [effects(item.effects) for item in near]
+    return joined([*names, *["another cause"][: len(names) == 1]], "or") or "none is named"
 
 
 def cause(report: Report) -> str:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.findings.verdict import equivalents
+from diagnosis.findings.verdict import equivalents, judge, loop_of_several
+from diagnosis.findings.which import other_loops
+from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.search import Search
+from tests.diagnosis.cases import STRONGEST, Cases, lab_a, lab_b
 from tests.diagnosis.specimens import MadeSpecimen, data_of
 
 DATA = data_of(MadeSpecimen())
@@ -34,3 +37,23 @@ def test_two_forms_of_an_effect_count_as_one_name() -> None:
 def test_an_effect_that_fits_worse_is_not_equivalent() -> None:
     worse = fit("cb", 0.0)
     assert equivalents(search(Fit(DATA, worse.values, worse.z, NOISY + 0.2))) == ()
+
+
+def test_several_values_of_one_loop_may_be_one_other_part_of_it(cases: Cases) -> None:
+    true = {"actuator.delay": {"delay": 0.004}, "actuator.time_constant": {"factor": 0.7}}
+    whole = cases.record(true, duration=STRONGEST)
+    data = residuals.prepare(lab_a(whole), whole)
+    bare, both = (fitting.fit(data, values) for values in ({}, true))
+    found = judge(Search(data, bare, both, ()))
+    assert (found.outcome, set(found.effects)) == ("explained", set(true))
+    assert 0.4 < found.probability < 0.5
+    assert "actuator" in other_loops(found)[0]
+    alone = fitting.at(data, {"actuator.delay": true["actuator.delay"]}, bare.z)
+    assert loop_of_several(Search(data, bare, alone, ())) == ""
+
+
+def test_several_values_of_a_damper_are_parts_of_their_own(cases: Cases) -> None:
+    data = residuals.prepare(lab_b(whole := cases.record()), whole)
+    bare = fitting.at(data, {}, np.zeros(len(data.part.nuisances)))
+    values = {"damper.mass": {"factor": 1.1}, "damper.stiffness": {"factor": 1.1}}
+    assert loop_of_several(Search(data, bare, fitting.at(data, values, bare.z), ())) == ""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -108,3 +110,23 @@ def test_the_building_tells_the_filter_of_a_force_alone(cases: Cases) -> None:
     assert view is not None
     assert view.behind
     assert not worth.is_gap(settling.settled(fitting.fit(residuals.prepare(view, found), {})))
+
+
+@pytest.mark.parametrize(
+    ("forces", "others", "said"),
+    [
+        (3e-3, 0.0, "All readings of forces"),
+        (0.0, 3e-3, "All readings but forces"),
+        (4e-3, 3e-3, "All readings"),
+    ],
+)
+def test_readings_that_are_late_alike_are_said(cases: Cases, forces: float, others: float, said: str) -> None:
+    record = cases.record()
+    delays = {
+        name: (forces if record.unit(name) == "N" else others, 1.0)
+        for lab in record.labs
+        for name in lab.measured
+    }
+    found = cast(Diagnosis, SimpleNamespace(record=record, logger=delays))
+    (sentence,) = logger.timed(found)
+    assert sentence.startswith(f"{said} come 3 ms late")

@@ -21,9 +21,6 @@ from diagnosis.fits.laws.best import BETTER
 from diagnosis.fits.trade import freedom
 from diagnosis.fits.unexplained import MATERIAL, remaining
 
-# Probability of other values of the plan's own parameters beside which something is left, over that of a mechanism that
-# leaves as much: half, as one unknown cause that they imitate is no less likely than two causes.
-EITHER = 0.5
 LEAST_TRACE = 0.1  # trace over noise below which a smaller one makes no difference: nothing can be seen of it
 SIGNS = ("clear", "names")
 
