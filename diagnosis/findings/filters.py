@@ -182,6 +182,7 @@ def of_laboratory(record: Record, part: LaboratoryPart, *, force: bool) -> Heard
 def of_building(record: Record, parts: Sequence[Part]) -> list[Heard]:
     """The force of the master's laboratory as the building's motion tells it, and that with the other forces used.
 
+    What the master's own converter added to a force is in the motion as well, and in no reading of a logger.
     Empty where the import map states a filter or delay of what goes into it.
     """
     found = next((part for part in parts if isinstance(part, Building)), None)
@@ -192,7 +193,7 @@ def of_building(record: Record, parts: Sequence[Part]) -> list[Heard]:
         Heard(
             MASTER,
             found.sources[: None if used else 1],
-            low_pass.spectra(*view.forces_demanded(used=used), interval, 0.5 / interval),
+            low_pass.spectra(*view.forces_demanded(used=used), interval, 0.5 / interval, noisy=True),
         )
         for used in (False, True)
     ]

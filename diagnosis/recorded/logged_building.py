@@ -107,11 +107,8 @@ class LoggedBuilding(Building):
         storey = [int(np.argmax(np.sum(np.square(forces), axis=0)))]
         own = [one for one in self.nuisances if not one.of_record]
         slopes = [left[:, storey] - self.left(one.moved(system, 1.0))[:, storey] for one in own]
-        return (
-            forces[:, storey],
-            (forces - left)[:, storey],
-            np.stack([*slopes, CALIBRATED * forces[:, storey]], axis=2),
-        )
+        demanded = (forces - left)[:, storey]
+        return forces[:, storey], demanded, np.stack([*slopes, CALIBRATED * demanded], axis=2)
 
     @property
     def shortest(self) -> float:

@@ -47,12 +47,22 @@ class Spectra(NamedTuple):
     true: Lines  # (lines, readings) without a filter
     slopes: Lines  # (lines, readings, parameters) of these over parameters that err by about one
     starts: NDArray[np.int64]  # (bands,) first line of each band
+    noisy: bool  # whether the readings without a filter hold noise that those recorded need not have
 
 
-def spectra(read: Array, true: Array, slopes: Array, interval: float, highest: float = HIGHEST) -> Spectra:
+def spectra(
+    read: Array,
+    true: Array,
+    slopes: Array,
+    interval: float,
+    highest: float = HIGHEST,
+    *,
+    noisy: bool = False,
+) -> Spectra:
     """Spectra up to `highest` (Hz) of readings as recorded and without a filter (ticks, readings).
 
-    `slopes` (ticks, readings, parameters) are those of the latter over parameters that err by about one.
+    `slopes` (ticks, readings, parameters) are those of the latter over parameters that err by about one. Where the
+    latter are `noisy`, a band tells of a filter only as far as the two go together.
     """
     frequency: Array = np.asarray(np.fft.rfftfreq(len(read), interval), dtype=np.float64)
     kept = (frequency >= LOWEST) & (frequency <= highest)
@@ -65,7 +75,7 @@ def spectra(read: Array, true: Array, slopes: Array, interval: float, highest: f
     frequency = frequency[kept]
     edges = np.geomspace(frequency[0], frequency[-1], BANDS + 1)[:-1]
     starts = np.unique(np.searchsorted(frequency, edges))
-    return Spectra(frequency, interval, lines(read), lines(true), lines(slopes), starts)
+    return Spectra(frequency, interval, lines(read), lines(true), lines(slopes), starts, noisy)
 
 
 def surprise(of: Spectra, channel: ImportedChannel) -> float:
@@ -90,11 +100,15 @@ def behind(of: Spectra, channel: ImportedChannel) -> Left:
     """What is left of readings behind a filter or delay, at the best parameters."""
     passed = response(channel, of.frequency, of.interval)[:, None]
     left, slopes = of.read - passed * of.true, passed[:, :, None] * of.slopes
-    least = SMALLEST**2 * means(of, of.read)
-    found = [Left(np.maximum(means(of, left), least), 0.0)]
-    for _ in range(ROUNDS):
-        z = fitted(left, slopes, np.repeat(found[-1].level, counts(of), axis=0))
-        found.append(Left(np.maximum(means(of, left - slopes @ z), least), float(z @ z)))
+    whole, z = means(of, of.read), np.zeros(slopes.shape[2])
+    most = whole if of.noisy else np.full_like(whole, math.inf)
+    found: list[Left] = []
+    while len(found) <= ROUNDS:
+        level = np.maximum(means(of, left - slopes @ z), SMALLEST**2 * whole)
+        found.append(Left(np.minimum(level, most), float(z @ z)))
+        # a band whose noise hides how the two go together tells nothing of a parameter, which would shrink that noise
+        level = np.where(level < most, level, math.inf)
+        z = fitted(left, slopes, np.repeat(level, counts(of), axis=0))
     return min(found, key=lambda one: weighed(of, one))
 
 

@@ -15,12 +15,13 @@ from common.roles import MASTER
 from diagnosis.findings import filters, logger
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting, residuals, settling, worth
+from diagnosis.fits.evidence import BEYOND
 from diagnosis.recorded import logged_building
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import NOT_LATE, Record
 from diagnosis.signals import low_pass
 from models.registry import Array
-from tests.diagnosis.cases import STRONGEST, Cases, imported, lab_a, lab_b
+from tests.diagnosis.cases import STRONGEST, Cases, imported, lab_a, lab_b, white
 
 INTERVAL = 0.002  # s
 BESSEL = LoggerFilter("bessel", 4, 40.0)
@@ -130,3 +131,18 @@ def test_readings_that_are_late_alike_are_said(cases: Cases, forces: float, othe
     found = cast(Diagnosis, SimpleNamespace(record=record, logger=delays))
     (sentence,) = logger.timed(found)
     assert sentence.startswith(f"{said} come 3 ms late")
+
+
+@pytest.mark.parametrize("noisy", [True, False])
+def test_noise_that_only_the_master_read_is_no_filter(noisy: bool) -> None:
+    ticks = INTERVAL * np.arange(8000)
+    force = np.sin(2.0 * np.pi * 2.0 * ticks) + 0.3 * np.sin(2.0 * np.pi * 5.3 * ticks)
+    smooth = signal.lfilter([np.sqrt(1.0 - 0.9**2)], [1.0, -0.9], white(51, ticks.size))
+    read, used = force + 0.02 * smooth, force + 0.006 * white(52, ticks.size)
+    slopes = 0.01 * used[:, None, None]
+    said = low_pass.roughly(
+        low_pass.spectra(read[:, None], used[:, None], slopes, INTERVAL, 250.0, noisy=noisy)
+    )
+    assert (
+        said.gain < BEYOND
+    ) == noisy  # if the master had read what the logger did, a filter must have passed it
