@@ -71,9 +71,11 @@ def unexplained(data: Data, fit: Fit) -> SiteTrace:
     """Trace of what a fit leaves, at the site where it most likely arises."""
     residual = data.residual(hypothesis.lay(data, fit.z, fit.values)) / data.sigma
     left = [item.ratio for item in gaps(fit, data.group)]
-    far = pinned(fit)
+    far = [
+        site for site, dot, _ in (name.rpartition(".") for name in pinned(fit)) if dot
+    ]  # a logger has no site
     # a parameter at its bound that leaves nothing to be seen took the gap upon itself
-    site = far[0].rpartition(".")[0] if far and max(left) < SEEN else culprits(fit)[0]
+    site = far[0] if far and max(left) < SEEN else culprits(fit)[0]
     kept = residual[:, int(np.argmax(left))]
     return SiteTrace(
         site,

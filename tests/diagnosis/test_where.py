@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,17 +13,19 @@ from hypothesis import strategies as st
 
 from diagnosis.findings import where
 from diagnosis.findings.sites.shares import shapley
+from diagnosis.findings.verdict import pinned
 from diagnosis.findings.where import SiteTrace
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import Building, Part
-from diagnosis.recorded.record import Record
+from diagnosis.recorded.record import NOT_LATE, Record
 from laboratories.effects import CATALOGUE, checked, lay
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_a, lab_b, white
 
 PLAYERS = ("actuator", "column", "table", "damper", "link")
 WORTH = st.floats(-1e3, 1e3)
+MACHINES = ("actuator", "column", "sensor.column_displacement", "sensor.column_force")
 
 
 def subsets(count: int) -> list[frozenset[str]]:
@@ -138,3 +141,15 @@ def test_a_trace_gives_its_times_and_its_frequency_band(cases: Cases) -> None:
     assert where.when(trace, whole) == ((2.0, 5.0),)
     low, high = where.frequencies(trace, whole)
     assert 3.0 < low < 4.0 < high < 5.0
+
+
+def test_a_delay_of_a_logger_at_its_bound_is_no_site(cases: Cases) -> None:
+    part = lab_a(whole := cases.record()).logged(NOT_LATE)
+    data = residuals.prepare(part, whole)
+    for place, name in ((-1, "gain"), (0, "actuator.gain")):
+        z = np.zeros(len(part.nuisances))
+        z[place] = hypothesis.TOLERANCES
+        fit = fitting.at(data, {}, z)
+        faint = replace(fit, reduced=np.zeros_like(fit.reduced))  # nothing is left to be seen
+        assert pinned(faint) == (name,)
+        assert where.unexplained(data, faint).site in (("actuator",) if place == 0 else MACHINES)
