@@ -105,6 +105,8 @@ UNRUN = {
         "rths blind --set many --seed 5407 --cases 14 --duration 12",
         "rths blind --set independent --only pair --seed 7601 --cases 14 --duration 12",
         "rths blind --set independent --only pair --seed 7888 --cases 16 --duration 12",
+        "rths blind --set loggers --seed 8999 --cases 30 --duration 12",
+        "rths blind --set independent --seed 7666 --cases 24 --duration 12",
         "rths blind --set judge --seed 8101 --only unknown,formula,catalogue --cases 24 --duration 16",
         "rths blind --set tune --only unknown --seed 9601 --cases 16 --duration 12",
         "rths blind --set tune --only catalogue --seed 9701 --cases 20 --duration 12",
