@@ -21,7 +21,7 @@ from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.parts import ALIKE, Building, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Delay, Late, Record
 from diagnosis.signals import low_pass
-from diagnosis.signals.low_pass import Spectra
+from diagnosis.signals.low_pass import ReadSpectra
 
 # Share of a reading's rms that a nominal model leaves, from which on an effect is at work: noise, a hum of 1 % of the
 # peak and a converter together leave up to 4 %.
@@ -31,12 +31,12 @@ ANY_GAIN = 0.1  # relative tolerance of a reading's gain, which says nothing of 
 AS_LIKELY = 0.02
 
 
-class Heard(NamedTuple):
+class AlikeReadings(NamedTuple):
     """Readings of one laboratory that may have passed one filter."""
 
     role: str  # of the process that it belongs to
     names: tuple[str, ...]  # of its channels
-    spectra: Spectra
+    spectra: ReadSpectra
 
     def gain(self, channel: ImportedChannel) -> float:
         """By how much less surprising they are behind a filter than with nothing."""
@@ -44,12 +44,12 @@ class Heard(NamedTuple):
         return nothing - behind
 
 
-class Candidate(NamedTuple):
+class LikelyFilter(NamedTuple):
     """The filter or delay of one laboratory."""
 
     channel: ImportedChannel
     gain: float
-    of: Heard
+    of: AlikeReadings
 
     @property
     def missed(self) -> float:
@@ -61,7 +61,7 @@ class Candidate(NamedTuple):
         own = self.of.gain(self.channel)
         return self.of.gain(other) > own - max(BEYOND, AS_LIKELY * own)
 
-    def spoken_for(self, several: Sequence[Candidate]) -> bool:
+    def spoken_for(self, several: Sequence[LikelyFilter]) -> bool:
         """Whether all of several that are late less allow it."""
         return all(other.allows(self.channel) for other in several if other.channel.late < self.channel.late)
 
@@ -70,7 +70,7 @@ class Common(NamedTuple):
     """A filter or delay of the logger, and what passed it."""
 
     channel: ImportedChannel = NOTHING_STATED
-    by: tuple[Heard, ...] = ()
+    by: tuple[AlikeReadings, ...] = ()
 
 
 def filtered(record: Record) -> Record:
@@ -85,7 +85,7 @@ def filtered(record: Record) -> Record:
     return replace(record, passed=by_channel(forces, others), late=late)
 
 
-def of_forces(labs: Sequence[Heard], exact: Sequence[Heard]) -> Common:
+def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> Common:
     """The filter of forces: that of the forces that the master used, and of the laboratories where none objects.
 
     Of `exact` each is such forces by the motion of the building, the likeliest of which count.
@@ -99,7 +99,7 @@ def of_forces(labs: Sequence[Heard], exact: Sequence[Heard]) -> Common:
     return agreed if channel.filter is None else Common(channel, (own, *agreed.by))
 
 
-def in_common(labs: Sequence[Heard], known: ImportedChannel = NOTHING_STATED) -> Common:
+def in_common(labs: Sequence[AlikeReadings], known: ImportedChannel = NOTHING_STATED) -> Common:
     """The filter or delay that readings of several laboratories passed, the one `known` where that is as likely.
 
     The laboratory decides that knows it best, unless it is less likely in one that is late less: what is like a filter
@@ -108,7 +108,7 @@ def in_common(labs: Sequence[Heard], known: ImportedChannel = NOTHING_STATED) ->
     """
     said = [(low_pass.roughly(one.spectra), one) for one in labs]
     sure = [
-        Candidate(low_pass.likeliest(one.spectra, item.late, BEYOND), item.gain, one)
+        LikelyFilter(low_pass.likeliest(one.spectra, item.late, BEYOND), item.gain, one)
         for item, one in said
         if item.gain > BEYOND
     ]
@@ -120,7 +120,7 @@ def in_common(labs: Sequence[Heard], known: ImportedChannel = NOTHING_STATED) ->
     return passed(labs, channel)
 
 
-def passed(labs: Sequence[Heard], channel: ImportedChannel) -> Common:
+def passed(labs: Sequence[AlikeReadings], channel: ImportedChannel) -> Common:
     """A filter or delay that readings of laboratories passed; nothing where one's are much less likely behind it."""
     if any(one.gain(channel) < -BEYOND for one in labs) or not labs:
         return Common()
@@ -129,7 +129,7 @@ def passed(labs: Sequence[Heard], channel: ImportedChannel) -> Common:
 
 def by_channel(*found: Common) -> dict[tuple[str, str], LoggerFilter]:
     """The filters by topic and name; channels of a laboratory that share one have the corner that all of them want."""
-    sharing: dict[tuple[str, LoggerFilter], list[Heard]] = {}
+    sharing: dict[tuple[str, LoggerFilter], list[AlikeReadings]] = {}
     for channel, one in ((common.channel, one) for common in found for one in common.by):
         if channel.filter is not None:
             sharing.setdefault((one.role, channel.filter), []).append(one)
@@ -140,7 +140,7 @@ def by_channel(*found: Common) -> dict[tuple[str, str], LoggerFilter]:
     return result
 
 
-def tuned(several: Sequence[Heard], common: LoggerFilter) -> LoggerFilter:
+def tuned(several: Sequence[AlikeReadings], common: LoggerFilter) -> LoggerFilter:
     """A filter with the corner that readings of a laboratory want, within what channels of a logger differ by.
 
     Readings that would rather be late by more are late for another reason.
@@ -155,12 +155,12 @@ def tuned(several: Sequence[Heard], common: LoggerFilter) -> LoggerFilter:
     return best.filter if best.filter and near and least < said(ImportedChannel(common)) - BEYOND else common
 
 
-def of_laboratories(record: Record, labs: Sequence[LaboratoryPart], *, force: bool) -> list[Heard]:
+def of_laboratories(record: Record, labs: Sequence[LaboratoryPart], *, force: bool) -> list[AlikeReadings]:
     """Forces, or else the other readings, of each laboratory that has any."""
     return [one for part in labs if (one := of_laboratory(record, part, force=force))]
 
 
-def of_laboratory(record: Record, part: LaboratoryPart, *, force: bool) -> Heard | None:
+def of_laboratory(record: Record, part: LaboratoryPart, *, force: bool) -> AlikeReadings | None:
     """Forces, or else the other readings, of a laboratory; None where none was recorded."""
     rows = zip(part.signals, part.lab.kind.channels.names, np.ptp(part.measured, axis=0), strict=True)
     there = {
@@ -176,10 +176,10 @@ def of_laboratory(record: Record, part: LaboratoryPart, *, force: bool) -> Heard
     slopes += [ANY_GAIN * true * (np.arange(len(places)) == own) for own in range(len(places))]
     interval, read = record.plan.test.interval, part.measured[:, places]
     spectra = low_pass.spectra(read, true, np.stack(slopes, axis=2), interval)
-    return Heard(part.role, tuple(there.values()), spectra)
+    return AlikeReadings(part.role, tuple(there.values()), spectra)
 
 
-def of_building(record: Record, parts: Sequence[Part]) -> list[Heard]:
+def of_building(record: Record, parts: Sequence[Part]) -> list[AlikeReadings]:
     """The force of the master's laboratory as the building's motion tells it, and that with the other forces used.
 
     What the master's own converter added to a force is in the motion as well, and in no reading of a logger.
@@ -190,7 +190,7 @@ def of_building(record: Record, parts: Sequence[Part]) -> list[Heard]:
         return []
     interval, view = record.plan.test.interval, LoggedBuilding(found)
     return [
-        Heard(
+        AlikeReadings(
             MASTER,
             found.sources[: None if used else 1],
             low_pass.spectra(*view.forces_demanded(used=used), interval, 0.5 / interval, noisy=True),

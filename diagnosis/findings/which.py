@@ -108,10 +108,12 @@ def other_numbers(verdict: PartVerdict) -> list[str]:
 def other_loops(verdict: PartVerdict) -> list[str]:
     """A sentence where several values of the plan of one transfer system are named."""
     loop = loop_of_several(verdict.search)
+    if not loop:
+        return []
     return [
         f"Several values of the plan are named of the {loop}. One other part of its loop, such as a filter in its "
         "feedback, may look the same: these signals cannot tell them apart."
-    ][: bool(loop)]
+    ]
 
 
 def described(fit: Fit) -> str:

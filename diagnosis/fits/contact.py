@@ -29,7 +29,6 @@ BEYOND = (
     30.0  # times the stroke before that: no motion that meets a stop goes so far, not even an unstable one
 )
 EVERY = 5  # of so many averaged samples one judges
-ENOUGH = 0.5  # s before the first contact that may show what else a laboratory has
 
 
 def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
@@ -47,7 +46,7 @@ def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
     reached = float(np.max(stroke[: max(1, first * data.group)]))
     if reached <= 0.0 or float(np.nanmax(stroke)) > BEYOND * reached:
         return None
-    groups = first + after(data)
+    groups = first + max(10, round(AFTER / (data.system.plan.test.interval * data.group)))
     starts = [
         {stop.place: share * reached, stop.stiffness: stiffness}
         for share in INSIDE
@@ -62,11 +61,6 @@ def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
     fits = each(lambda start: grown(data, fit, effect, start, groups), begun)
     springs, others = by_law(fits, effect.name)
     return simplest(min(springs, key=cost), others)
-
-
-def after(data: Data) -> int:
-    """Averaged samples after first contact that the shortest fit covers."""
-    return max(10, round(AFTER / (data.system.plan.test.interval * data.group)))
 
 
 def stop_of(fit: Fit) -> Effect | None:

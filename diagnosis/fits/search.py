@@ -79,8 +79,8 @@ def searched(bare: Fit, scales: Scales) -> Search:
     if remaining(chosen) < worth.LOUD:  # what leaves more has not found its largest effects yet
         chosen = together(chosen, scales, beside if chosen is before else None)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
-    if (relieved := trade.relieved(chosen, others, scales, TOGETHER)) is not chosen:
-        chosen, others = relieved, [chosen, *candidates.alternatives(relieved, first, scales)]
+    if (more := trade.two_for_one(chosen, others, scales, TOGETHER)) is not chosen:
+        chosen, others = more, [chosen, *candidates.alternatives(more, first, scales)]
     chosen, others = trade.on_all(chosen, others)
     found = Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others)))
     found = plainest(believed(likeliest(found)))

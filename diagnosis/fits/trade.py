@@ -195,7 +195,7 @@ def released(fit: Fit, scales: Scales) -> list[Fit]:
     return [item for item in others if tied(fit, item) and item.prior < fit.prior - PULLED]
 
 
-def relieved(fit: Fit, rivals: Sequence[Fit], scales: Scales, most: int) -> Fit:
+def two_for_one(fit: Fit, rivals: Sequence[Fit], scales: Scales, most: int) -> Fit:
     """The fit, or one with two effects in the place of one that brings back nominal parameters which moved too far.
 
     `rivals` are fits with one effect exchanged, best first. One effect may do what two do, as a compliance what a gain

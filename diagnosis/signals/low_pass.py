@@ -38,8 +38,8 @@ SMALLEST = 1e-4  # of a reading, residual that counts: four digits of a text fil
 GOLDEN, DIVISIONS = 0.5 * (math.sqrt(5.0) - 1.0), 7  # which leave a thirtieth of a range
 
 
-class Spectra(NamedTuple):
-    """Spectra of readings of one laboratory."""
+class ReadSpectra(NamedTuple):
+    """ReadSpectra of readings of one laboratory."""
 
     frequency: Array  # (lines,) Hz
     interval: float  # s
@@ -58,8 +58,8 @@ def spectra(
     highest: float = HIGHEST,
     *,
     noisy: bool = False,
-) -> Spectra:
-    """Spectra up to `highest` (Hz) of readings as recorded and without a filter (ticks, readings).
+) -> ReadSpectra:
+    """ReadSpectra up to `highest` (Hz) of readings as recorded and without a filter (ticks, readings).
 
     `slopes` (ticks, readings, parameters) are those of the latter over parameters that err by about one. Where the
     latter are `noisy`, a band tells of a filter only as far as the two go together.
@@ -75,46 +75,50 @@ def spectra(
     frequency = frequency[kept]
     edges = np.geomspace(frequency[0], frequency[-1], BANDS + 1)[:-1]
     starts = np.unique(np.searchsorted(frequency, edges))
-    return Spectra(frequency, interval, lines(read), lines(true), lines(slopes), starts, noisy)
+    return ReadSpectra(frequency, interval, lines(read), lines(true), lines(slopes), starts, noisy)
 
 
-def surprise(of: Spectra, channel: ImportedChannel) -> float:
+def surprise(of: ReadSpectra, channel: ImportedChannel) -> float:
     """−2·log of how probable the readings are behind a filter or delay, at the best parameters, up to a constant."""
     return weighed(of, behind(of, channel))
 
 
-def missed(of: Spectra, channel: ImportedChannel) -> float:
+def missed(of: ReadSpectra, channel: ImportedChannel) -> float:
     """Largest share of a reading's rms that is left behind a filter or delay, at the best parameters."""
     rest, whole = (counts(of) @ level for level in (behind(of, channel).level, means(of, of.read)))
     return float(np.sqrt(np.max(rest / whole)))
 
 
-class Left(NamedTuple):
+class Unlike(NamedTuple):
     """What readings differ by from what they would be."""
 
     level: Array  # (bands, readings) mean square
     prior: float  # Σ z² of the parameters
 
 
-def behind(of: Spectra, channel: ImportedChannel) -> Left:
+def behind(of: ReadSpectra, channel: ImportedChannel) -> Unlike:
     """What is left of readings behind a filter or delay, at the best parameters."""
     passed = response(channel, of.frequency, of.interval)[:, None]
     left, slopes = of.read - passed * of.true, passed[:, :, None] * of.slopes
-    whole, z = means(of, of.read), np.zeros(slopes.shape[2])
-    most = whole if of.noisy else np.full_like(whole, math.inf)
-    found: list[Left] = []
-    while len(found) <= ROUNDS:
-        level = np.maximum(means(of, left - slopes @ z), SMALLEST**2 * whole)
-        found.append(Left(np.minimum(level, most), float(z @ z)))
+    least, most = SMALLEST**2 * means(of, of.read), highest(of)
+    found = [Unlike(np.maximum(means(of, left), least), 0.0)]
+    for _ in range(ROUNDS):
         # a band whose noise hides how the two go together tells nothing of a parameter, which would shrink that noise
-        level = np.where(level < most, level, math.inf)
+        level = np.where(found[-1].level < most, found[-1].level, math.inf)
         z = fitted(left, slopes, np.repeat(level, counts(of), axis=0))
+        found.append(Unlike(np.maximum(means(of, left - slopes @ z), least), float(z @ z)))
     return min(found, key=lambda one: weighed(of, one))
 
 
-def weighed(of: Spectra, left: Left) -> float:
+def highest(of: ReadSpectra) -> Array:
+    """Mean square (bands, readings) from which on nothing of a reading goes together with what it would be."""
+    return means(of, of.read) if of.noisy else np.full((of.starts.size, of.read.shape[1]), math.inf)
+
+
+def weighed(of: ReadSpectra, left: Unlike) -> float:
     """−2·log of the probability of what is left, and of the parameters."""
-    return 2.0 * OWN * float(np.sum(counts(of) @ np.log(left.level))) + left.prior
+    level = np.minimum(left.level, highest(of))
+    return 2.0 * OWN * float(np.sum(counts(of) @ np.log(level))) + left.prior
 
 
 def response(channel: ImportedChannel, frequency: Array, interval: float) -> Lines:
@@ -131,12 +135,12 @@ def response(channel: ImportedChannel, frequency: Array, interval: float) -> Lin
     return turns * sum((n + b * back) / (1.0 - k * back) for n, b, k in zip(now, before, kept, strict=True))
 
 
-def counts(of: Spectra) -> NDArray[np.int64]:
+def counts(of: ReadSpectra) -> NDArray[np.int64]:
     """Lines of each band (bands,)."""
     return np.diff(np.append(of.starts, of.frequency.size))
 
 
-def means(of: Spectra, values: Lines) -> Array:
+def means(of: ReadSpectra, values: Lines) -> Array:
     """Mean square of each band (bands, readings)."""
     energy = np.add.reduceat(np.square(values.real) + np.square(values.imag), of.starts)
     return np.asarray(energy / counts(of)[:, None])
@@ -178,14 +182,14 @@ class Said(NamedTuple):
     gain: float  # by how much less surprising they are behind it than with nothing
 
 
-def roughly(of: Spectra) -> Said:
+def roughly(of: ReadSpectra) -> Said:
     """The likeliest filter of a usual order, or delay alone."""
     tried = {late: min(surprise(of, one(late)) for one in ROUGH) for late in LATES}
     late = min(tried, key=lambda late: tried[late])
     return Said(late, tried[late], surprise(of, NOTHING_STATED) - tried[late])
 
 
-def likeliest(of: Spectra, late: float, beyond: float) -> ImportedChannel:
+def likeliest(of: ReadSpectra, late: float, beyond: float) -> ImportedChannel:
     """The filter behind which readings are least surprising, of those that delay by about `late` s.
 
     It is a delay alone where none makes them less surprising by more than `beyond`.

@@ -230,7 +230,9 @@ def rivals(report: Report) -> str:
     first = (report.which[0].probability or 0.0) if report.which else 0.0
     near = [item for item in once(report.which)[:3] if (item.probability or 0.0) >= NEAR * first]
     names = [effects(item.effects) for item in near]
-    return joined([*names, *["another cause"][: len(names) == 1]], "or") or "none is named"
+    if len(names) == 1:
+        names.append("another cause")
+    return joined(names, "or") or "none is named"
 
 
 def cause(report: Report) -> str:

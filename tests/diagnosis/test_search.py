@@ -291,34 +291,6 @@ def test_an_effect_that_is_small_beside_another_is_named_where_both_leave_only_n
     assert set(together(fitting.fit(data, effects), scales).names) == set(effects)
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "count", "taken"),
-    [
-        (0.308, 0.296, 1, False),
-        (0.45, 0.0, 1, False),
-        (0.45, 0.0, 3, True),
-        (0.45, 0.2, 3, False),
-        (0.7, 0.4, 1, False),
-        (0.7, 0.29, 1, True),
-    ],
-)
-def test_a_faint_rest_is_not_filled_up_with_effects(
-    monkeypatch: pytest.MonkeyPatch, before: float, after: float, count: int, taken: bool
-) -> None:
-    one, two = SimpleNamespace(names=("a",), prior=0.0), SimpleNamespace(names=("a", "b"), prior=0.0)
-    monkeypatch.setattr("diagnosis.fits.search.count", lambda _: count)
-    monkeypatch.setattr(worth, "strained", lambda _: False)
-    monkeypatch.setattr(worth, "is_gap", lambda fit: fit is one or after > 0.1)
-    left = {one.names: before, two.names: after}
-    monkeypatch.setattr("diagnosis.fits.search.remaining", lambda fit: left[fit.names])
-    monkeypatch.setattr("diagnosis.fits.search.leaves", lambda fit, _: fit is one)
-    monkeypatch.setattr("diagnosis.fits.search.model_error", lambda _: 0.0)
-    monkeypatch.setattr("diagnosis.fits.search.excess", lambda fit: 1e3 * left[fit.names] ** 4)
-    monkeypatch.setattr(candidates, "best_laws", lambda *_: [two])
-    monkeypatch.setattr(candidates, "without", lambda *_: one)
-    assert together(one, None) is (two if taken else one)  # type: ignore[arg-type, comparison-overlap]
-
-
 @pytest.mark.parametrize(("left", "refines"), [(6.0, True), (4e5, False)])
 def test_an_effect_that_leaves_hardly_anything_is_worth_it_however_large_the_whole_gap(
     monkeypatch: pytest.MonkeyPatch, left: float, refines: bool

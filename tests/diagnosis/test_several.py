@@ -54,6 +54,34 @@ def test_an_effect_beside_three_is_found_by_the_nominal_parameter_that_stands_in
     assert names - set(FOUR) <= {"sensor.column_force.gain", "sensor.column_displacement.gain"}
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "count", "taken"),
+    [
+        (0.308, 0.296, 1, False),
+        (0.45, 0.0, 1, False),
+        (0.45, 0.0, 3, True),
+        (0.45, 0.2, 3, False),
+        (0.7, 0.4, 1, False),
+        (0.7, 0.29, 1, True),
+    ],
+)
+def test_a_faint_rest_is_not_filled_up_with_effects(
+    monkeypatch: pytest.MonkeyPatch, before: float, after: float, count: int, taken: bool
+) -> None:
+    one, two = SimpleNamespace(names=("a",), prior=0.0), SimpleNamespace(names=("a", "b"), prior=0.0)
+    monkeypatch.setattr("diagnosis.fits.search.count", lambda _: count)
+    monkeypatch.setattr(worth, "strained", lambda _: False)
+    monkeypatch.setattr(worth, "is_gap", lambda fit: fit is one or after > 0.1)
+    left = {one.names: before, two.names: after}
+    monkeypatch.setattr("diagnosis.fits.search.remaining", lambda fit: left[fit.names])
+    monkeypatch.setattr("diagnosis.fits.search.leaves", lambda fit, _: fit is one)
+    monkeypatch.setattr("diagnosis.fits.search.model_error", lambda _: 0.0)
+    monkeypatch.setattr("diagnosis.fits.search.excess", lambda fit: 1e3 * left[fit.names] ** 4)
+    monkeypatch.setattr(candidates, "best_laws", lambda *_: [two])
+    monkeypatch.setattr(candidates, "without", lambda *_: one)
+    assert together(one, None) is (two if taken else one)  # type: ignore[arg-type, comparison-overlap]
+
+
 def test_an_effect_that_came_before_is_exchanged_beside_one_that_it_stood_in_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -69,14 +97,14 @@ def test_an_effect_that_came_before_is_exchanged_beside_one_that_it_stood_in_for
     assert together(one, None) is right  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("z", "after", "relieved"), [(3.3, 0.4, True), (2.4, 0.4, False), (3.3, 2.9, False)])
+@pytest.mark.parametrize(("z", "after", "taken"), [(3.3, 0.4, True), (2.4, 0.4, False), (3.3, 2.9, False)])
 def test_two_effects_take_the_place_of_one_where_they_bring_nominal_parameters_back(
-    monkeypatch: pytest.MonkeyPatch, z: float, after: float, relieved: bool
+    monkeypatch: pytest.MonkeyPatch, z: float, after: float, taken: bool
 ) -> None:
     chosen, rival, two = fit("ab", z), fit("ac", 5.0, 1.0), fit("acd", after)
     monkeypatch.setattr(candidates, "extended", lambda *_, **__: [two])
     monkeypatch.setattr(worth, "is_gap", lambda _: False)
-    assert trade.relieved(chosen, [rival], None, 6) is (two if relieved else chosen)  # type: ignore[arg-type]
+    assert trade.two_for_one(chosen, [rival], None, 6) is (two if taken else chosen)  # type: ignore[arg-type]
 
 
 def test_hypotheses_that_err_in_withheld_seconds_only_are_told_apart_by_fits_to_all(
