@@ -95,6 +95,8 @@ def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> 
     if first is None or own is None or first.gain < BEYOND:
         return in_common(labs)
     channel = low_pass.likeliest(own.spectra, first.late, BEYOND)
+    if low_pass.missed(own.spectra, channel) > SPOILT:  # something is at work in the building
+        return in_common(labs)
     agreed = passed(labs, channel)
     return agreed if channel.filter is None else Common(channel, (own, *agreed.by))
 

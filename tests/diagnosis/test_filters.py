@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from common.recording.imported import ImportedChannel, LoggerFilter
+from common.recording.imported import NOTHING_STATED, ImportedChannel, LoggerFilter
 from common.roles import MASTER
 from diagnosis.findings import filters, logger
 from diagnosis.findings.found import Diagnosis
@@ -28,6 +28,8 @@ BESSEL = LoggerFilter("bessel", 4, 40.0)
 LATE = ImportedChannel(BESSEL).late
 DIGITAL = signal.butter(4, 100.0, fs=500.0)
 DIGITAL_LATE = 2.613 / (2.0 * 500.0 * np.tan(np.pi * 100.0 / 500.0))  # s, by which it delays slow motion
+TICKS = INTERVAL * np.arange(8000)  # s
+SWING = np.sin(2.0 * np.pi * 2.0 * TICKS) + 0.3 * np.sin(2.0 * np.pi * 5.3 * TICKS)  # a force of a building
 FORCES = {("master", "column_force"), ("slave", "damper_force")}
 
 
@@ -133,16 +135,27 @@ def test_readings_that_are_late_alike_are_said(cases: Cases, forces: float, othe
     assert sentence.startswith(f"{said} come 3 ms late")
 
 
+def demanded(read: Array, used: Array, *, noisy: bool = True) -> low_pass.ReadSpectra:
+    """Spectra of a force (ticks,) that a logger read, and of the one that a building's motion demands."""
+    slopes = 0.01 * used[:, None, None]
+    return low_pass.spectra(read[:, None], used[:, None], slopes, INTERVAL, 250.0, noisy=noisy)
+
+
 @pytest.mark.parametrize("noisy", [True, False])
 def test_noise_that_only_the_master_read_is_no_filter(noisy: bool) -> None:
-    ticks = INTERVAL * np.arange(8000)
-    force = np.sin(2.0 * np.pi * 2.0 * ticks) + 0.3 * np.sin(2.0 * np.pi * 5.3 * ticks)
-    smooth = signal.lfilter([np.sqrt(1.0 - 0.9**2)], [1.0, -0.9], white(51, ticks.size))
-    read, used = force + 0.02 * smooth, force + 0.006 * white(52, ticks.size)
-    slopes = 0.01 * used[:, None, None]
+    smooth = signal.lfilter([np.sqrt(1.0 - 0.9**2)], [1.0, -0.9], white(51, SWING.size))
     said = low_pass.roughly(
-        low_pass.spectra(read[:, None], used[:, None], slopes, INTERVAL, 250.0, noisy=noisy)
+        demanded(SWING + 0.02 * smooth, SWING + 0.006 * white(52, SWING.size), noisy=noisy)
     )
     assert (
         said.gain < BEYOND
     ) == noisy  # if the master had read what the logger did, a filter must have passed it
+
+
+def test_friction_in_the_joints_of_a_building_is_no_filter_of_its_forces() -> None:
+    rate = np.gradient(SWING)
+    used = SWING + 0.4 * np.tanh(5.0 * rate / np.std(rate)) + 0.006 * white(52, SWING.size)
+    spectra = demanded(SWING + 0.02 * white(53, SWING.size), used)
+    assert low_pass.roughly(spectra).gain > BEYOND  # what is late looks like it
+    building = filters.AlikeReadings(MASTER, ("column_force",), spectra)
+    assert filters.of_forces([], [building]).channel == NOTHING_STATED
