@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.findings.sensors.one_motion import one_motion, one_place
 from diagnosis.findings.sensors.own_reading import machine_alone
 from diagnosis.findings.sensors.slow_noise import under_less_noise
 from diagnosis.findings.sites.likely import APART, REST, ranked
@@ -31,8 +32,8 @@ HALF = 0.5
 # that the true cause is not among the effects named, by outcome.
 TEMPERATURE = 3.0
 DOUBT = {"explained": 0.02, "partly": 0.12, "unknown": 0.9}
-# Probability of other values of the plan's own parameters where one unknown cause may look the same, over that without:
-# half, as one cause is no less likely than two.
+# Probability of several effects of which one unknown cause may look the same, over that without: half, as one cause is
+# no less likely than two.
 EITHER = 0.5
 MOST_LEFT = 0.2  # of a gap's rms that effects may leave as an error of such solutions: 4 % of its energy
 # Share of a gap's rms that may be taken for coloured noise where only the residual itself is evidence: a sixth of its
@@ -95,7 +96,9 @@ def with_effects(search: Search) -> PartVerdict:
     same = [tied(search.chosen, other) for other in search.alternatives]
     whole = 1.0 + sum(chances)
     named = (1.0 + sum(value for value, yes in zip(chances, same, strict=True) if yes)) / whole
-    sure = (1.0 - DOUBT[outcome]) * certainty(search) * (EITHER if loop_of_several(search) else 1.0)
+    sure = (1.0 - DOUBT[outcome]) * certainty(search)
+    if loop_of_several(search) or one_place(search):
+        sure *= EITHER
     others = tuple(
         (other, sure * value / whole)
         for other, value, yes in zip(search.alternatives, chances, same, strict=True)
@@ -230,18 +233,6 @@ def trifling(search: Search) -> bool:
         return False
     sites = {item.site for item in ranked(search.commissioned) if item.cost < APART}
     return not sites <= {item.site for item in effects}
-
-
-def one_motion(search: Search) -> bool:
-    """Whether errors of several readings are named that follow from one motion of a machine.
-
-    One cause at the machine is likelier than two that agree by chance.
-    """
-    effects = [search.data.catalogue[name] for name in search.chosen.names]
-    if len({item.site for item in effects}) < 2 or {item.kind for item in effects} != {"measurement"}:
-        return False
-    near = [item for item in ranked(search.commissioned) if item.cost < APART and item.left < REST]
-    return any("sensor." not in item.site for item in near)
 
 
 def misplaced(search: Search) -> bool:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from diagnosis.findings.sensors.one_motion import one_place
 from diagnosis.findings.verdict import equivalents, judge, loop_of_several
 from diagnosis.findings.which import other_loops
 from diagnosis.fits import fitting, residuals
@@ -57,3 +59,19 @@ def test_several_values_of_a_damper_are_parts_of_their_own(cases: Cases) -> None
     bare = fitting.at(data, {}, np.zeros(len(data.part.nuisances)))
     values = {"damper.mass": {"factor": 1.1}, "damper.stiffness": {"factor": 1.1}}
     assert loop_of_several(Search(data, bare, fitting.at(data, values, bare.z), ())) == ""
+
+
+@pytest.mark.parametrize(("share", "one"), [(1.0, True), (-1.0, False), (0.3, False)])
+def test_offsets_of_two_readings_may_be_those_of_a_piston_that_stands_elsewhere(
+    cases: Cases, share: float, one: bool
+) -> None:
+    data = residuals.prepare(lab_a(whole := cases.record()), whole)
+    offset = 1e-4  # m
+    force = share * whole.plan.column.stiffness * offset
+    values = {
+        "actuator.deadband": {"width": 2e-4},
+        "sensor.column_displacement.bias": {"offset": offset},
+        "sensor.column_force.bias": {"offset": force},
+    }
+    bare, fit = (fitting.at(data, given, np.zeros(len(data.part.nuisances))) for given in ({}, values))
+    assert one_place(Search(data, bare, fit, ())) is one
