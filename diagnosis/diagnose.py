@@ -19,7 +19,16 @@ from diagnosis.findings.sensors import readings, staircases
 from diagnosis.findings.sensors.loud_noise import no_noise
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.sensors.staircases import Stairs
-from diagnosis.findings.verdict import UNNAMED, WITHOUT_GAP, PartVerdict, heard, judge, seen_in, sharpest
+from diagnosis.findings.verdict import (
+    UNNAMED,
+    WITHOUT_GAP,
+    PartVerdict,
+    heard,
+    judge,
+    pickup,
+    seen_in,
+    sharpest,
+)
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
@@ -136,6 +145,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         exchanged(record),
         {} if late is not None else held,  # a logger's steps repeat samples too
         readings.floors(loud, steps, sensors, record),
+        noise(verdicts, pickup),
         [
             *together(more),
             *of_plan(record),

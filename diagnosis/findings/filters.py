@@ -185,17 +185,18 @@ def of_building(record: Record, parts: Sequence[Part]) -> list[AlikeReadings]:
     """The force of the master's laboratory as the building's motion tells it, and that with the other forces used.
 
     What the master's own converter added to a force is in the motion as well, and in no reading of a logger.
+    The first is missing where what was recorded of the other forces is not what the master used.
     Empty where the import map states a filter or delay of what goes into it.
     """
     found = next((part for part in parts if isinstance(part, Building)), None)
     if found is None or not (found.whole and found.linear and found.sources) or found.treated:
         return []
     interval, view = record.plan.test.interval, LoggedBuilding(found)
-    return [
-        AlikeReadings(
-            MASTER,
-            found.sources[: None if used else 1],
-            low_pass.spectra(*view.forces_demanded(used=used), interval, 0.5 / interval, noisy=True),
-        )
+    own, every = (
+        low_pass.spectra(*view.forces_demanded(used=used), interval, 0.5 / interval, noisy=True)
         for used in (False, True)
-    ]
+    )
+    result = [AlikeReadings(MASTER, found.sources, every)]
+    if low_pass.louder(every, own) < BEYOND:
+        result.insert(0, AlikeReadings(MASTER, found.sources[:1], own))
+    return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -26,9 +27,16 @@ class Diagnosis:
     readings: Sequence[SensorFinding] = ()
     link: Sequence[LinkFinding] = ()
     held: Mapping[str, float] = field(default_factory=dict)  # sensors that repeat samples, and how many
-    white: Mapping[str, float] = field(default_factory=dict)  # rms of each reading's noise
+    white: Mapping[str, float] = field(default_factory=dict)  # rms of each reading's noise, lines aside
+    lines: Mapping[str, float] = field(
+        default_factory=dict
+    )  # rms of the narrow lines that each reading picks up
     warnings: Sequence[str] = ()
     learned: Sequence[LearnedLaw] = ()  # what no effect explains
+
+    def noise(self, name: str) -> float:
+        """Rms of a reading's noise with the lines that it picks up, in its unit."""
+        return math.hypot(self.white.get(name, 0.0), self.lines.get(name, 0.0))
 
     def named(self, site: str) -> list[str]:
         """The effects found at a site."""

@@ -81,9 +81,9 @@ class RecordingGaps:
         more = left or {}
         if self.loop is not None:
             linked = linked and bool(self.found.link)
-            return self.logged(self.loop.simulate(systems, linked=linked, errors=self.errors(more)))
-        told = self.open(systems)
-        return self.logged({name: values + more.get(name, 0.0) for name, values in told.items()})
+            rows = self.loop.simulate(systems, linked=linked, errors=self.errors(more))
+            return None if rows is None else self.logged(rows)
+        return {name: values + more.get(name, 0.0) for name, values in self.open(systems).items()}
 
     def errors(self, left: Mapping[str, Array]) -> dict[str, Array]:
         """What is left of readings by signal, as rows (ticks, channels) of the laboratories that have any, by role."""
@@ -94,9 +94,9 @@ class RecordingGaps:
             if any(name in left for name in lab.measured)
         }
 
-    def logged(self, simulated: Mapping[str, Array] | None) -> Mapping[str, Array] | None:
+    def logged(self, simulated: Mapping[str, Array]) -> Mapping[str, Array]:
         """Simulated readings as the logger that was found has them: late, and with its gain."""
-        if simulated is None or self.record.stated is None:
+        if self.record.stated is None:
             return simulated
         ticks = np.arange(self.record.ticks) * self.record.plan.test.interval
         result = dict(simulated)
@@ -106,11 +106,11 @@ class RecordingGaps:
         return result
 
     def open(self, systems: Mapping[str, System]) -> Mapping[str, Array]:
-        """Each part's own prediction, where no loop was recorded."""
+        """Each part's own prediction behind the logger, from what was recorded of its input."""
         result: dict[str, Array] = {}
         for part in self._parts:
             result |= dict(zip(part.signals, part.predict(systems[part.role]).T, strict=True))
-        return result
+        return self.logged(result)
 
     def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:
         """Gap per response signal."""
@@ -150,13 +150,17 @@ class RecordingGaps:
         return float(np.sqrt(np.mean(apart**2))) > SEEN * self.found.white.get(name, 0.0)
 
     def floor(self) -> dict[str, float]:
-        """Gap that noise alone makes."""
-        if self.loop is not None:
-            systems = self.found.systems(plans=self.record.plans, noisy=False)
-            return self.loop.floor(systems, self.found.white, self.mask)
-        result = {}
-        for name, white in self.found.white.items():
-            there = self.record.present[name] & self.mask
-            level = float(np.mean(self.record.signals[name][there] ** 2)) if there.any() else 0.0
-            result[name] = white / float(np.sqrt(level)) if level > 0.0 else 0.0
-        return result
+        """Gap that noise alone makes, with the lines that sensors pick up."""
+        found = self.found
+        if self.loop is None:
+            return {name: self.over(name, found.noise(name)) for name in found.white}
+        systems = found.systems(plans=self.record.plans, noisy=False)
+        noisy = self.loop.floor(systems, found.white, self.mask)
+        lines = {name: self.over(name, found.lines.get(name, 0.0)) for name in noisy}
+        return {name: math.hypot(value, lines[name]) for name, value in noisy.items()}
+
+    def over(self, name: str, rms: float) -> float:
+        """An rms of a reading's unit over that of the reading where the gap is judged, 0 where it has none."""
+        there = self.record.present[name] & self.mask
+        level = float(np.mean(self.record.signals[name][there] ** 2)) if there.any() else 0.0
+        return rms / math.sqrt(level) if level > 0.0 else 0.0

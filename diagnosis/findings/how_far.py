@@ -142,7 +142,7 @@ def by_readings(own: RecordingGaps, summary: HowFar) -> HowFar:
         recorded = own.record.signals[name][there]
         level = float(np.sqrt(np.mean(recorded**2)))
         errors = [float(np.sqrt(np.mean((recorded - one[name][there]) ** 2))) / level for one in known]
-        rows.append((*errors, own.found.white.get(name, 0.0) / level))
+        rows.append((*errors, own.found.noise(name) / level))
     before, after, floor = (float(np.sqrt(np.mean(np.square(column)))) for column in zip(*rows, strict=True))
     return replace(
         summary,

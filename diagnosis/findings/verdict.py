@@ -267,6 +267,12 @@ def sharpest(search: Search) -> Array:
     return residuals.noise(data.residual(hypothesis.lay(data, fit.z, fit.values)))
 
 
+def pickup(search: Search) -> Array:
+    """Rms (signals,) of the narrow lines that a part's sensors pick up."""
+    lines = search.data.lines
+    return np.zeros(search.data.sigma.size) if lines is None else np.sqrt(np.mean(np.square(lines), axis=0))
+
+
 def unproven(search: Search) -> bool:
     """Whether a large share of a gap is taken for noise for which the residual itself is the only evidence."""
     before, after = search.commissioned, search.chosen

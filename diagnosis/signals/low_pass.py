@@ -135,6 +135,15 @@ def response(channel: ImportedChannel, frequency: Array, interval: float) -> Lin
     return turns * sum((n + b * back) / (1.0 - k * back) for n, b, k in zip(now, before, kept, strict=True))
 
 
+def louder(of: ReadSpectra, less: ReadSpectra) -> float:
+    """2·log of how much likelier what readings would be is by itself than with what was taken from it in `less`.
+
+    What takes away a part of a signal leaves less, and what was recorded of that part with noise of its own adds this.
+    """
+    whole, rest = (np.maximum(means(one, one.true), SMALLEST**2 * means(of, of.read)) for one in (of, less))
+    return 2.0 * OWN * float(np.sum(counts(of) @ np.log(rest / whole)))
+
+
 def counts(of: ReadSpectra) -> NDArray[np.int64]:
     """Lines of each band (bands,)."""
     return np.diff(np.append(of.starts, of.frequency.size))

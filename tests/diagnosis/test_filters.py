@@ -17,6 +17,7 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting, residuals, settling, worth
 from diagnosis.fits.evidence import BEYOND
 from diagnosis.recorded import logged_building
+from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import NOT_LATE, Record
 from diagnosis.signals import low_pass
@@ -113,6 +114,18 @@ def test_the_building_tells_the_filter_of_a_force_alone(cases: Cases) -> None:
     assert view is not None
     assert view.behind
     assert not worth.is_gap(settling.settled(fitting.fit(residuals.prepare(view, found), {})))
+
+
+@pytest.mark.parametrize(("noise", "several"), [(0.0, False), (5.0, True)])
+def test_forces_with_noise_that_the_motion_lacks_are_not_those_used(
+    cases: Cases, noise: float, several: bool
+) -> None:
+    whole = cases.record()
+    used = whole.signals["damper_force_used"]
+    noisy = used + noise * white(32, used.size)
+    record = replace(imported(whole), signals=whole.signals | {"damper_force_used": noisy})
+    names = {one.names for one in filters.of_building(record, parts_of(record))}
+    assert names == {("column_force", "damper_force_used"), *([] if several else [("column_force",)])}
 
 
 @pytest.mark.parametrize(

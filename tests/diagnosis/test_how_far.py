@@ -20,7 +20,7 @@ from diagnosis.findings.where import SiteTrace
 from diagnosis.recorded import record
 from diagnosis.recorded.loop import closed_share, overall
 from rths.examine.diagnose import diagnose_file
-from tests.diagnosis.cases import SECONDS, STRONGEST, Cases, Effects
+from tests.diagnosis.cases import SECONDS, STRONGEST, Cases, Effects, imported
 
 FOUND: dict[str, Effects] = {
     "column": {"column.friction": {"force": 900.0}},
@@ -153,6 +153,31 @@ def test_without_a_loop_the_parts_are_judged_by_themselves(cases: Cases, looples
     judged = how_far.judge(loopless, [without_table_target(cases)])
     assert judged.how_far.judged_on == "other recordings"
     assert judged.how_far.plain()["closed"] > 0.9
+
+
+def test_what_a_sensor_picks_up_is_a_part_of_the_noise_floor(loopless: Diagnosis, rubbing: Diagnosis) -> None:
+    for found in (loopless, rubbing):
+        level = float(np.sqrt(np.mean(np.square(found.record.signals["damper_force"]))))
+        before, after = (
+            gaps.RecordingGaps(one, one.record, np.ones(one.record.ticks, dtype=bool)).floor()
+            for one in (found, dataclasses.replace(found, lines={"damper_force": 0.1 * level}))
+        )
+        assert after.pop("damper_force") == pytest.approx(
+            math.hypot(before.pop("damper_force"), 0.1), rel=1e-9
+        )
+        assert after == before
+
+
+def test_parts_without_a_loop_are_compared_behind_the_logger(loopless: Diagnosis) -> None:
+    found = dataclasses.replace(loopless, record=imported(loopless.record))
+    plain, late = dataclasses.replace(found), dataclasses.replace(found)
+    plain.__dict__["logger"], late.__dict__["logger"] = {}, {"damper_stroke": (0.0, 1.02)}
+    before, after = (
+        gaps.RecordingGaps(one, one.record, np.ones(one.record.ticks, dtype=bool)).open(one.systems())
+        for one in (plain, late)
+    )
+    assert after["damper_stroke"] == pytest.approx(1.02 * before["damper_stroke"], rel=1e-12)
+    assert after["damper_force"] == pytest.approx(before["damper_force"], rel=1e-12)
 
 
 def test_a_recording_of_other_parts_judges_nothing_and_says_so(cases: Cases, loopless: Diagnosis) -> None:
