@@ -90,13 +90,14 @@ def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> 
 
     Of `exact` each is such forces by the motion of the building, the likeliest of which count.
     """
-    said = [(low_pass.roughly(one.spectra), one) for one in exact]
-    first, own = min(said, key=lambda item: item[0].surprise, default=(None, None))
+    tried = [(low_pass.roughly(one.spectra), one) for one in exact]
+    first, own = min(tried, key=lambda item: item[0].surprise, default=(None, None))
     if first is None or own is None or first.gain < BEYOND:
         return in_common(labs)
     channel = low_pass.likeliest(own.spectra, first.late, BEYOND)
-    if low_pass.missed(own.spectra, channel) > SPOILT:  # something is at work in the building
-        return in_common(labs)
+    said = low_pass.surprise(own.spectra, channel)
+    if low_pass.missed(own.spectra, channel) > SPOILT or low_pass.surprise_unknown(own.spectra) < said:
+        return in_common(labs)  # something is at work in the building
     agreed = passed(labs, channel)
     return agreed if channel.filter is None else Common(channel, (own, *agreed.by))
 

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.recording.imported import FILTERS, NOTHING_STATED, ImportedChannel, LoggerFilter
+from diagnosis.signals.mask import Mask
 from models.registry import Array
 
 Lines = NDArray[np.complex128]
@@ -34,6 +35,7 @@ LOWEST, HIGHEST, BANDS = 0.5, 80.0, 16
 # Proceedings of the IEEE 66 (1978), 51-83).
 OWN = 2.0 / 3.0
 ROUNDS = 2  # of fits, each weighted by what the one before it leaves
+FREE = 1e-6  # of what a known parameter weighs, weight of one that may have any value
 SMALLEST = 1e-4  # of a reading, residual that counts: four digits of a text file
 GOLDEN, DIVISIONS = 0.5 * (math.sqrt(5.0) - 1.0), 7  # which leave a thirtieth of a range
 
@@ -83,6 +85,11 @@ def surprise(of: ReadSpectra, channel: ImportedChannel) -> float:
     return weighed(of, behind(of, channel))
 
 
+def surprise_unknown(of: ReadSpectra) -> float:
+    """The same without a filter or delay where any one parameter may have any value, the best of them."""
+    return min(weighed(of, behind(of, NOTHING_STATED, free)) for free in range(of.slopes.shape[2]))
+
+
 def missed(of: ReadSpectra, channel: ImportedChannel) -> float:
     """Largest share of a reading's rms that is left behind a filter or delay, at the best parameters."""
     rest, whole = (counts(of) @ level for level in (behind(of, channel).level, means(of, of.read)))
@@ -96,17 +103,18 @@ class Unlike(NamedTuple):
     prior: float  # Σ z² of the parameters
 
 
-def behind(of: ReadSpectra, channel: ImportedChannel) -> Unlike:
-    """What is left of readings behind a filter or delay, at the best parameters."""
+def behind(of: ReadSpectra, channel: ImportedChannel, free: int | None = None) -> Unlike:
+    """What is left of readings behind a filter or delay, at the best parameters, of which one may be `free`."""
     passed = response(channel, of.frequency, of.interval)[:, None]
     left, slopes = of.read - passed * of.true, passed[:, :, None] * of.slopes
     least, most = SMALLEST**2 * means(of, of.read), highest(of)
+    known = np.arange(of.slopes.shape[2]) != free
     found = [Unlike(np.maximum(means(of, left), least), 0.0)]
     for _ in range(ROUNDS):
         # a band whose noise hides how the two go together tells nothing of a parameter, which would shrink that noise
         level = np.where(found[-1].level < most, found[-1].level, math.inf)
-        z = fitted(left, slopes, np.repeat(level, counts(of), axis=0))
-        found.append(Unlike(np.maximum(means(of, left - slopes @ z), least), float(z @ z)))
+        z = fitted(left, slopes, np.repeat(level, counts(of), axis=0), known)
+        found.append(Unlike(np.maximum(means(of, left - slopes @ z), least), float(z[known] @ z[known])))
     return min(found, key=lambda one: weighed(of, one))
 
 
@@ -155,12 +163,15 @@ def means(of: ReadSpectra, values: Lines) -> Array:
     return np.asarray(energy / counts(of)[:, None])
 
 
-def fitted(left: Lines, slopes: Lines, level: Array) -> Array:
-    """Parameters (parameters,) that leave the least, in view of what they err by and of mean squares of the rest."""
+def fitted(left: Lines, slopes: Lines, level: Array, known: Mask) -> Array:
+    """Parameters (parameters,) that leave the least, in view of mean squares of the rest and of what they err by.
+
+    Those that are not `known` may err by anything.
+    """
     weights = np.sqrt(2.0 * OWN / level)
     A = (weights[:, :, None] * slopes).reshape(-1, slopes.shape[2])
     y = (weights * left).ravel()
-    square = (A.conj().T @ A).real + np.eye(A.shape[1])
+    square = (A.conj().T @ A).real + np.diag(np.where(known, 1.0, FREE))
     return np.asarray(np.linalg.solve(square, (A.conj().T @ y).real))
 
 

@@ -172,3 +172,16 @@ def test_friction_in_the_joints_of_a_building_is_no_filter_of_its_forces() -> No
     assert low_pass.roughly(spectra).gain > BEYOND  # what is late looks like it
     building = filters.AlikeReadings(MASTER, ("column_force",), spectra)
     assert filters.of_forces([], [building]).channel == NOTHING_STATED
+
+
+@pytest.mark.parametrize("damped", [True, False])
+def test_a_building_that_is_damped_otherwise_is_no_filter_of_its_forces(damped: bool) -> None:
+    rate = np.gradient(SWING, INTERVAL)
+    read = SWING - LATE * rate if damped else behind_bessel(SWING + 0.02 * white(55, SWING.size))
+    noisy = read + 0.002 * white(54, SWING.size)
+    # of a mass and a damping, a tolerance each
+    slopes = np.stack([0.01 * SWING, 5e-4 * rate], axis=1)[:, None]
+    spectra = low_pass.spectra(noisy[:, None], SWING[:, None], slopes, INTERVAL, 250.0, noisy=True)
+    assert low_pass.roughly(spectra).gain > BEYOND
+    found = filters.of_forces([], [filters.AlikeReadings(MASTER, ("column_force",), spectra)])
+    assert (found.channel == NOTHING_STATED) == damped
