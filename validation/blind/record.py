@@ -15,7 +15,7 @@ from common.errors import InputError, InterlockError
 from common.plan import read as plans
 from common.recording.reader import read
 from simulation.workers.pool import spread
-from validation.blind.best import gaps, silent_run
+from validation.blind.best import gaps, silent_run, without_noise
 from validation.blind.cases.case import Case, levels, reality
 from validation.blind.logger.loggers import LOGGERS
 from validation.blind.logger.relogging import relog
@@ -52,7 +52,7 @@ def record(case: Case, folder: Path) -> RecordedCase:
     path = folder / f"{secrets.token_hex(8)}.mcap"
     played = path.with_suffix(".true") if case.logger else path
     try:
-        bench = virtual.assemble(plan, reality(case), played)
+        bench = virtual.assemble(without_noise(plan) if case.logger else plan, reality(case), played)
     except InputError as error:
         raise InputError(f"Case {case.index} ({truth(case)}) cannot be built: {error}") from None
     ended = virtual.run(bench, lambda: "")

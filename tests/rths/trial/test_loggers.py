@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from common.plan.plan import Plan
+from common.plan.read import with_test
+from common.reality.reality import from_reality
 from common.recording.reader import read
 from common.signals import COLUMN_CHANNELS, Signal
 from models.registry import Array
 from tests.rths.trial.test_scoring import RUB, answer, case, judged
+from validation.blind.best import silent_run
 from validation.blind.cases.basis import basis
 from validation.blind.draw import begin, draw
 from validation.blind.logger import logged
@@ -113,6 +117,17 @@ def test_a_relogged_recording_is_an_import_that_does_not_name_its_logger(tmp_pat
     level = hidden.truths["sensors"]["column_force"]
     bends = np.diff(master["column_force"], 2)  # white noise gives √6 of its rms, the motion next to nothing
     assert np.std(bends) == pytest.approx(math.sqrt(6.0) * level, rel=0.2)
+
+
+def test_a_piston_that_stands_still_behind_a_dead_band_ends_no_test_without_noise(tmp_path: Path) -> None:
+    plan = with_test(Plan(), duration=4.0)
+    sensors = dict.fromkeys(asdict(plan.sensors), 0.0)
+    tables = {"effect": [{"name": "actuator.deadband", "width": 0.005}], "sensors": sensors}
+    run = silent_run(plan, from_reality(tables, plan, tmp_path), tmp_path / "true.mcap")
+    read_ = run.columns["master"]["column_displacement"]
+    alike = np.lib.stride_tricks.sliding_window_view(read_, plan.safety.frozen_readings)
+    assert np.ptp(alike, axis=1).min() == 0.0
+    assert run.ticks("master") == plan.ticks
 
 
 def test_naming_an_effect_of_the_logger_does_not_count_as_a_false_name() -> None:
