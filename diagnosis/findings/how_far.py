@@ -39,8 +39,8 @@ ROOM = 0.1
 # within noise only. An effect of this size counts as visible in a trial.
 VISIBLE = 2.0
 NOT_SHOWN = (
-    "The response of the closed loop hardly shows the effects, so the share that closes is that of the readings of the "
-    "part with the effect."
+    "The response of the test hardly shows the effects, so the share that closes is that of the readings of the part "
+    "with the effect."
 )
 DRAWS = 200  # of the bootstrap: its 5 % and 95 % points then rest on ten draws each
 BLOCK = 2.0  # s, blocks of the bootstrap: two withheld pieces of 1 s lie side by side, and errors within are correlated
@@ -80,7 +80,7 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
         noise_floor=floor,
         judged_on=where_judged,
     )
-    hidden = own.loop is not None and hardly_shown(found, summary, own.between(before, after))
+    hidden = hardly_shown(found, summary, own.between(before, after))
     told = by_readings(own, summary) if hidden else summary
     others = validated(found, validation, summary) if validation else told
     share, rows = shares(own, traces)
@@ -100,7 +100,7 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
 
 
 def hardly_shown(found: Diagnosis, summary: HowFar, changed: float) -> bool:
-    """Whether effects were named that the response of the closed loop hardly shows beside its noise.
+    """Whether effects were named that the response of the test hardly shows beside its noise.
 
     They have `changed` it by less than the noise hides, as a share of its rms, and what is left may be noise and an
     error of nominal parameters.
