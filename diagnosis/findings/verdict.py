@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.findings.sensors.one_motion import one_motion, one_place
-from diagnosis.findings.sensors.own_reading import machine_alone
+from diagnosis.findings.sensors.own_reading import errors, machine_alone
 from diagnosis.findings.sensors.slow_noise import under_less_noise
 from diagnosis.findings.sites.likely import APART, REST, ranked
 from diagnosis.findings.sites.signatures import laboratory_of
@@ -96,15 +96,23 @@ def with_effects(search: Search) -> PartVerdict:
     same = [tied(search.chosen, other) for other in search.alternatives]
     whole = 1.0 + sum(chances)
     named = (1.0 + sum(value for value, yes in zip(chances, same, strict=True) if yes)) / whole
-    sure = (1.0 - DOUBT[outcome]) * certainty(search)
-    if loop_of_several(search) or one_place(search):
-        sure *= EITHER
+    sure = (1.0 - DOUBT[outcome]) * certainty(search) * (EITHER if other_cause(search) else 1.0)
     others = tuple(
         (other, sure * value / whole)
         for other, value, yes in zip(search.alternatives, chances, same, strict=True)
         if not yes
     )
     return PartVerdict(search, outcome, sure * named, others, equivalents(search))
+
+
+def other_cause(search: Search) -> bool:
+    """Whether one other cause may look the same as what is named, to the last of what can be seen.
+
+    It is another part of a loop of which several values are named, another place of a machine in the place of offsets,
+    or another law of a machine of which a reading is named as well that shows nothing else: both are one function of
+    the same motion.
+    """
+    return bool(loop_of_several(search) or one_place(search) or errors(search.chosen))
 
 
 def loop_of_several(search: Search) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from diagnosis.findings.certainty import trust
 from diagnosis.findings.certainty.intervals import Interval, intervals
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.sensors.own_reading import errors
 from diagnosis.findings.verdict import EITHER, PartVerdict, loop_of_several
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.trade import tied
@@ -53,7 +54,9 @@ def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Na
     others.sort(key=lambda item: -(item.probability or 0.0))
     first = entry(effects, probability, parameters, 0.0)
     ends = [warning for name, values in fits.items() for warning in at_the_end(catalogue[name], values)]
-    as_good = [sentence for verdict in named for sentence in (*other_numbers(verdict), *other_loops(verdict))]
+    as_good = [
+        sentence for verdict in named for sentence in (*other_numbers(verdict), *other_causes(verdict))
+    ]
     return Named((first, *others[:MOST_OTHERS]), (*ends, *as_good))
 
 
@@ -105,11 +108,15 @@ def other_numbers(verdict: PartVerdict) -> list[str]:
     ]
 
 
-def other_loops(verdict: PartVerdict) -> list[str]:
-    """A sentence where several values of the plan of one transfer system are named."""
+def other_causes(verdict: PartVerdict) -> list[str]:
+    """A sentence where several values of the plan of one transfer system, or a machine and its reading, are named."""
     loop = loop_of_several(verdict.search)
     if not loop:
-        return []
+        return [
+            f"{name} stands beside an effect that shows in this reading alone. Another law of the machine may look the "
+            "same: these signals cannot tell them apart."
+            for name in errors(verdict.search.chosen)
+        ]
     return [
         f"Several values of the plan are named of the {loop}. One other part of its loop, such as a filter in its "
         "feedback, may look the same: these signals cannot tell them apart."

@@ -63,10 +63,7 @@ def search(data: Data, scales: Scales) -> Search:
 
 def searched(bare: Fit, scales: Scales) -> Search:
     """Select effects one by one beside the fit without any, exchange and prune them, and fit what else might be."""
-    first = candidates.best_laws(bare, scales) if worth.is_gap(bare) else []
-    if not (first and worth.is_worth(bare, bare, first[0])):  # under noise that is a gap no effect shows
-        bare, instead = settling.instead_of_colour(bare, scales)
-        first = instead or first
+    bare, first = one_by_one(bare, scales)
     if first:
         first = sorted([*coupled(bare, first), *first], key=lambda fit: fit.cost)
     bare, chosen, first, beside = selected(bare, first, scales)
@@ -91,6 +88,22 @@ def searched(bare: Fit, scales: Scales) -> Search:
         return found
     chosen, others = trade.on_all(chosen, candidates.alternatives(chosen, first, scales))
     return plainest(Search(bare.data, bare, chosen, tuple(map(trimmed, others))))
+
+
+def one_by_one(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
+    """The fit without effects, and those with one, best first, under one noise.
+
+    Under noise that is a gap no effect shows. Where it is far louder than a sensor's, an effect may show for a small
+    part that this noise leaves of another one, which is then far likelier.
+    """
+    first = candidates.best_laws(bare, scales) if worth.is_gap(bare) else []
+    shows = bool(first) and worth.is_worth(bare, bare, first[0])
+    if shows and not settling.is_loud(bare):
+        return bare, first
+    other, instead = settling.instead_of_colour(bare, scales)
+    if not instead or (shows and not settling.far_likelier(instead[0], settling.remodelled(first[0]))):
+        return bare, first
+    return other, instead
 
 
 def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, list[Fit], list[Fit] | None]:

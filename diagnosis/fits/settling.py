@@ -19,7 +19,7 @@ from diagnosis.fits.screening import ScreenedEffect
 from diagnosis.fits.sensor_noise import quieter
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, gaps, leaves, model_error
-from diagnosis.fits.worth import changes, idle, is_gap
+from diagnosis.fits.worth import changes, idle
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 
@@ -162,16 +162,14 @@ def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
 
     What is taken for coloured noise may be an effect, at rest as in motion: effects are fitted under white noise,
     and the best is taken if the data are far more probable under it and the noise that it leaves. Without such an
-    effect the list is empty. Where nominal parameters are at the ends of their tolerances as well, and the noise is
-    far louder than a sensor's, effects are also fitted under their further laws.
+    effect the list is empty. Where the noise is far louder than a sensor's, effects are fitted under all their laws.
     """
     if not sensor_noise.coloured(bare.data):
         return bare, []
-    bare, found = far_likelier_ones(bare, in_white_noise(bare, scales))
-    if not found and is_loud(bare) and is_gap(bare):
-        white = fitting.at(sensor_noise.whitened(bare), {}, bare.z)
-        bare, found = far_likelier_ones(bare, candidates.best_laws(white, scales))
-    return bare, found
+    if not is_loud(bare):
+        return far_likelier_ones(bare, in_white_noise(bare, scales))
+    white = fitting.at(sensor_noise.whitened(bare), {}, bare.z)
+    return far_likelier_ones(bare, candidates.best_laws(white, scales))
 
 
 def beside_colour(fit: Fit, scales: Scales) -> Fit | None:

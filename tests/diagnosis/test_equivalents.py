@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis.findings.sensors.one_motion import one_place
 from diagnosis.findings.verdict import equivalents, judge, loop_of_several
-from diagnosis.findings.which import other_loops
+from diagnosis.findings.which import other_causes
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.search import Search
@@ -49,7 +49,7 @@ def test_several_values_of_one_loop_may_be_one_other_part_of_it(cases: Cases) ->
     found = judge(Search(data, bare, both, ()))
     assert (found.outcome, set(found.effects)) == ("explained", set(true))
     assert 0.4 < found.probability < 0.5
-    assert "actuator" in other_loops(found)[0]
+    assert "actuator" in other_causes(found)[0]
     alone = fitting.at(data, {"actuator.delay": true["actuator.delay"]}, bare.z)
     assert loop_of_several(Search(data, bare, alone, ())) == ""
 

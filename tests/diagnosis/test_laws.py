@@ -12,6 +12,7 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import in_best_laws
 from diagnosis.fits.laws.specimen import follow, path
+from diagnosis.fits.laws.starts import gridded
 from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
@@ -196,6 +197,30 @@ def test_a_law_behind_the_first_starts_on_the_side_that_promises() -> None:
     assert best.effect.laws[int(best.values["law"])].name == "with a bend"
     assert best.values["share"] < 0.0
     assert fitting.at(bare.data, {best.effect.name: best.values}, bare.z).cost < bare.cost
+
+
+class HardlyRubbing(Cracked):
+    """A column alone that is elastic, with Coulomb friction of less than half of the weakest start of a search."""
+
+    FORCE = 10.0
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.candidates = (CATALOGUE["column.friction"],)
+        rubbing = self.FORCE * np.sign(np.gradient(self.inputs))
+        self.measured = (K * self.inputs + rubbing)[:, None]
+
+
+def test_a_law_behind_the_first_starts_as_weak_as_its_effect_is() -> None:
+    bare = fitting.fit(data_of(HardlyRubbing()), {})
+    best = unlike_first(bare, Sizes())[0]
+    assert best.values["force"] == pytest.approx(HardlyRubbing.FORCE, rel=0.5)
+
+
+def test_a_limit_that_is_neared_gradually_is_looked_for_far_above_what_is_reached() -> None:
+    effect, bare = CATALOGUE["damper.force_limit"], fitting.fit(data_of(Bent()), {})
+    levels = [values["force"] for values in gridded(bare, effect, 1, Sizes())]
+    assert max(levels) > 3.0 * max(effect.parameters[0].sizes)
 
 
 def cracked(values: Values) -> Fit:

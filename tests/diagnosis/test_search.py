@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnosis.fits import candidates, fitting, residuals, screening, unexplained, worth
+from diagnosis.fits import candidates, evidence, fitting, residuals, screening, settling, unexplained, worth
 from diagnosis.fits import search as searching
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.scales import Scales
@@ -27,6 +27,7 @@ from tests.diagnosis.cases import (
     white,
 )
 from tests.diagnosis.test_equivalents import DATA, NOISY
+from tests.diagnosis.test_laws import Sizes
 
 # play behind the loop, of which the law of play before the loop promises nothing
 PLAYED = {"width": 1.5e-4, "contact": 200.0, "flank": 0.7, "guide": 628.0, "law": 1.0}
@@ -79,6 +80,21 @@ def test_an_effect_is_found_with_its_parameters(
     assert report["status"] == "explained"
     for name, error in near.items():
         assert estimate(report, effect, name) == pytest.approx(values[name], rel=error)
+
+
+@pytest.mark.parametrize(("surer", "leads"), [(20.0, "b"), (2.0, "a")])
+def test_an_effect_that_shows_under_loud_noise_gives_way_to_a_far_likelier_one_in_its_place(
+    monkeypatch: pytest.MonkeyPatch, surer: float, leads: str
+) -> None:
+    bare, a, b = (Fit(DATA, {name: {} for name in names}, np.zeros(0), NOISY) for names in ("", "a", "b"))
+    monkeypatch.setattr(candidates, "best_laws", lambda *_: [a])
+    monkeypatch.setattr(worth, "is_gap", lambda _: True)
+    monkeypatch.setattr(worth, "is_worth", lambda *_: True)
+    monkeypatch.setattr(settling, "is_loud", lambda _: True)
+    monkeypatch.setattr(settling, "remodelled", lambda fit: fit)
+    monkeypatch.setattr(settling, "instead_of_colour", lambda *_: (bare, [b]))
+    monkeypatch.setattr(evidence, "surprise", lambda fit: -surer if fit is b else 0.0)
+    assert searching.one_by_one(bare, Sizes())[1][0].names == (leads,)
 
 
 def test_an_effect_that_acts_in_one_second_only_is_found_with_no_second_withheld(cases: Cases) -> None:

@@ -15,7 +15,7 @@ from diagnosis.findings.certainty.trust import less_by_freedom, of_the_plan, sha
 from diagnosis.findings.report import status_of
 from diagnosis.findings.sensors.own_reading import machine_alone
 from diagnosis.findings.sensors.slow_noise import lone_noise
-from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge
+from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge, other_cause
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
 from diagnosis.fits.fitting import Fit, at_end
 from diagnosis.fits.hypothesis import TOLERANCES, Values
@@ -105,7 +105,9 @@ def test_a_small_error_of_a_load_cell_is_the_law_of_its_specimen(
     whole = cases.record(effects, duration=8.0)
     data = residuals.prepare(lab_a(whole), whole)
     found = Search(data, fitting.fit(data, {}), fitting.fit(data, effects), ())
-    assert machine_alone(found).chosen.names == tuple(effects)[: 1 + others]
+    stands = machine_alone(found)
+    assert stands.chosen.names == tuple(effects)[: 1 + others]
+    assert other_cause(stands) == (others == 1)  # a law of the specimen and what its load cell makes of it
 
 
 def test_errors_of_readings_that_leave_a_tenth_of_a_gap_are_not_its_cause() -> None:

@@ -20,6 +20,9 @@ NEARER = np.geomspace(0.5, 1.3, 10)  # times the strength found under another la
 FINER = (0.0, 0.5, 1.5)  # times the sizes of the first shape that a law has, beside these
 REACHED = (0.15, 0.3, 0.5, 0.75)  # of the largest deformation: where a bend is looked for
 WEAKER, GRID = 0.25, 8  # times the least size of a search: where a grid over the sizes begins, and its points
+# Times the largest size of a search: a level that a law nears gradually is felt far below it, by (peak/level)ⁿ/n, which
+# is 0.5 % at 4 times the peak with n = 3.
+ABOVE = 4.0
 # Over the secant of the whole column: a spring that gives way by a tenth of the motion, between one that bends it and
 # one that is not seen, and softer ones, which a part beside the column may have.
 STIFFNESSES = (0.1, 1.0, 10.0)
@@ -45,7 +48,8 @@ def gridded(fit: Fit, effect: Effect, place: int, scales: Scales) -> Iterator[di
     sizes = scales.sizes(effect, strength)
     if not sizes or min(sizes) <= 0.0:
         return
-    for size in np.geomspace(WEAKER * min(sizes), max(sizes), GRID).tolist():
+    most = max(sizes) * (ABOVE if strength.bends_by else 1.0)
+    for size in np.geomspace(WEAKER * min(sizes), most, GRID).tolist():
         base = effect.under(place, effect.values({strength.name: within(strength, size)}))
         for shape in shapes(fit, effect, place, finer=()):
             yield base | shape

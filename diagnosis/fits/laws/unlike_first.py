@@ -8,16 +8,21 @@ from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.laws.starts import gridded
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.screening import Plane, ScreenedEffect
+from diagnosis.fits.screening import FARTHER, Plane, ScreenedEffect
 from diagnosis.fits.threads import each
 from laboratories.effects.effect import Effect
+
+MUCH_SMALLER = 0.25  # share of a start, below which fits from there take many steps: they end after a few
+AS_MUCH = 0.9  # of what a start promises: what it does is no straight line if a smaller one promises less
 
 
 def unlike_first(fit: Fit, scales: Scales) -> list[ScreenedEffect]:
     """What effects promise over a fit under laws behind their first, best first.
 
     Each is laid at a grid of starts: play behind a loop looks like no size of play before it, and what it does is no
-    straight line in its parameters. Models of specimens are left out, which follow force over deformation.
+    straight line in its parameters. Where it nearly is one, as friction that is far weaker than any usual one, the
+    start goes along that line as long as it promises no less. Models of specimens are left out, which follow force
+    over deformation.
     """
     plane = Plane(fit)
     ways = [
@@ -27,7 +32,7 @@ def unlike_first(fit: Fit, scales: Scales) -> list[ScreenedEffect]:
         if place and not law.model and effect.name not in fit.names
     ]
 
-    def promised(effect: Effect, values: dict[str, float]) -> ScreenedEffect:
+    def promised(effect: Effect, values: dict[str, float]) -> tuple[ScreenedEffect, float]:
         change = (
             fitting.at(fit.data, fit.values | {effect.name: values}, fit.z).reduced - fit.reduced
         ).ravel()
@@ -35,11 +40,21 @@ def unlike_first(fit: Fit, scales: Scales) -> list[ScreenedEffect]:
         start = scales.stretched(
             effect, values, math.copysign(1.0, share)
         )  # as large, to the side that promises
-        return ScreenedEffect(effect, start, z, gain)
+        return ScreenedEffect(effect, start, z, gain), share
+
+    def smaller(found: ScreenedEffect, share: float) -> ScreenedEffect:
+        for _ in range(FARTHER):
+            if not 0.0 < abs(share) < MUCH_SMALLER:
+                break
+            nearer, share = promised(found.effect, scales.stretched(found.effect, found.values, abs(share)))
+            if nearer.gain < AS_MUCH * found.gain:
+                break
+            found = nearer
+        return found
 
     def best(way: tuple[Effect, int]) -> list[ScreenedEffect]:
         found = [promised(way[0], values) for values in gridded(fit, *way, scales)]
-        return sorted(found, key=lambda item: -item.gain)[:1]
+        return [smaller(*item) for item in sorted(found, key=lambda item: -item[0].gain)[:1]]
 
     found = [item for items in each(best, ways) for item in items]
     return sorted(found, key=lambda item: -item.gain)
