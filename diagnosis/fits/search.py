@@ -93,12 +93,12 @@ def searched(bare: Fit, scales: Scales) -> Search:
 def one_by_one(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
     """The fit without effects, and those with one, best first, under one noise.
 
-    Under noise that is a gap no effect shows. Where it is far louder than a sensor's, an effect may show for a small
-    part that this noise leaves of another one, which is then far likelier.
+    Under noise that is a gap no effect shows. Where that of one reading stands out, an effect may show for a small part
+    that this noise leaves of another one, which is then far likelier.
     """
     first = candidates.best_laws(bare, scales) if worth.is_gap(bare) else []
     shows = bool(first) and worth.is_worth(bare, bare, first[0])
-    if shows and not settling.is_loud(bare):
+    if shows and not settling.stands_out(bare):
         return bare, first
     other, instead = settling.instead_of_colour(bare, scales)
     if not instead or (shows and not settling.far_likelier(instead[0], settling.remodelled(first[0]))):

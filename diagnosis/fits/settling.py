@@ -19,7 +19,7 @@ from diagnosis.fits.screening import ScreenedEffect
 from diagnosis.fits.sensor_noise import quieter
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, gaps, leaves, model_error
-from diagnosis.fits.worth import changes, idle
+from diagnosis.fits.worth import changes, idle, is_gap
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 
@@ -118,6 +118,15 @@ def is_loud(fit: Fit) -> bool:
     return bool(np.any(sensor_noise.loudest(fit) > LOUDEST))
 
 
+def stands_out(fit: Fit) -> bool:
+    """Whether the noise of one reading is far louder at some frequency, over that at the highest ones, than of others.
+
+    A logger treats its channels alike, so that such noise may be an effect however little of it shows as a gap.
+    """
+    *_, second, first = np.sort(np.append(sensor_noise.loudest(fit), 1.0))
+    return bool(first > LOUDEST * second)
+
+
 def doubtful(fit: Fit) -> Mask:
     """The signals (signals,) whose coloured noise the inputs foresee, or which is loud and comes and goes."""
     least = np.maximum(MATERIAL, model_error(fit))
@@ -162,12 +171,16 @@ def instead_of_colour(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:
 
     What is taken for coloured noise may be an effect, at rest as in motion: effects are fitted under white noise,
     and the best is taken if the data are far more probable under it and the noise that it leaves. Without such an
-    effect the list is empty. Where the noise is far louder than a sensor's, effects are fitted under all their laws.
+    effect the list is empty. Effects are also fitted under their further laws where the noise of one reading stands
+    out, or where nominal parameters are at the ends of their tolerances as well and noise is far louder than a
+    sensor's.
     """
     if not sensor_noise.coloured(bare.data):
         return bare, []
-    if not is_loud(bare):
-        return far_likelier_ones(bare, in_white_noise(bare, scales))
+    if not stands_out(bare):
+        bare, found = far_likelier_ones(bare, in_white_noise(bare, scales))
+        if found or not (is_loud(bare) and is_gap(bare)):
+            return bare, found
     white = fitting.at(sensor_noise.whitened(bare), {}, bare.z)
     return far_likelier_ones(bare, candidates.best_laws(white, scales))
 

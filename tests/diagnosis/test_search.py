@@ -90,7 +90,7 @@ def test_an_effect_that_shows_under_loud_noise_gives_way_to_a_far_likelier_one_i
     monkeypatch.setattr(candidates, "best_laws", lambda *_: [a])
     monkeypatch.setattr(worth, "is_gap", lambda _: True)
     monkeypatch.setattr(worth, "is_worth", lambda *_: True)
-    monkeypatch.setattr(settling, "is_loud", lambda _: True)
+    monkeypatch.setattr(settling, "stands_out", lambda _: True)
     monkeypatch.setattr(settling, "remodelled", lambda fit: fit)
     monkeypatch.setattr(settling, "instead_of_colour", lambda *_: (bare, [b]))
     monkeypatch.setattr(evidence, "surprise", lambda fit: -surer if fit is b else 0.0)
