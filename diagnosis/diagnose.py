@@ -94,7 +94,7 @@ def diagnose(
 
 def put_right(record: Record) -> Record:
     """A record on the clock of its commands, with what its logger did to its readings and its map does not state."""
-    return filters.filtered(logger.clocked(record))
+    return filters.filtered(logger.clocked(logger.sampled_together(record)))
 
 
 def among(record: Record, systems: Mapping[str, System]) -> Record:

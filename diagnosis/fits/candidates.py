@@ -14,6 +14,7 @@ from diagnosis.fits import contact, fitting
 from diagnosis.fits.fitting import TIED, Fit, everywhere, excess
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import descended, in_best_laws, raced
+from diagnosis.fits.laws.loop import single
 from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import ScreenedEffect, screen
@@ -139,7 +140,7 @@ def without(fit: Fit, name: str) -> Fit:
 
 def exchanged(fit: Fit, scales: Scales) -> Fit:
     """A better fit with one effect exchanged for another, if there is any."""
-    for name in fit.names[:-1]:
+    for name in single(fit)[:-1]:
         others = extended(without(fit, name), scales, count=3, known=fit)
         if others and others[0].cost < fit.cost - TIED:
             fit = others[0]
@@ -152,7 +153,7 @@ def in_other_laws(fit: Fit) -> Fit:
     While an effect was missing, one that came before it was held against its other laws beside what that left. Models
     of specimens are left out, which follow all of a force.
     """
-    for name in fit.names[:-1]:
+    for name in single(fit)[:-1]:
         if len(fit.data.catalogue[name].laws) > 1 and leaves(fit):
             rest = {key: values for key, values in fit.values.items() if key != name}
             better = raced([replace(fit, values=rest | {name: fit.values[name]})], modelled=False)
@@ -166,7 +167,7 @@ def alternatives(fit: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, ...]:
     if len(fit.names) < 2:
         return tuple(item for item in first if item.names != fit.names)
     result: list[Fit] = []
-    for name in fit.names:
+    for name in single(fit):
         others = [item for item in extended(without(fit, name), scales, known=fit) if name not in item.names]
         if others and is_gap(fit) and excess(others[0]) < HOPELESS * excess(fit):
             others = under_further_laws(others)

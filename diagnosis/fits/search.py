@@ -11,6 +11,7 @@ import numpy as np
 from diagnosis.fits import candidates, contact, fitting, hypothesis, settling, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.laws.coupled import coupled
+from diagnosis.fits.laws.loop import held, single, whole_loops
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
@@ -65,7 +66,8 @@ def searched(bare: Fit, scales: Scales) -> Search:
     """Select effects one by one beside the fit without any, exchange and prune them, and fit what else might be."""
     bare, first = one_by_one(bare, scales)
     if first:
-        first = sorted([*coupled(bare, first), *first], key=lambda fit: fit.cost)
+        whole = [*coupled(bare, first), *whole_loops(bare, first)]
+        first = sorted([*whole, *first], key=lambda fit: fit.cost)
     bare, chosen, first, beside = selected(bare, first, scales)
     if not chosen.names:
         return Search(bare.data, bare, chosen, ())
@@ -73,7 +75,7 @@ def searched(bare: Fit, scales: Scales) -> Search:
     chosen = pruned(bare, chosen)
     most = MOST + len(chosen.names) - count(chosen)
     chosen, as_good = trade.traded(bare, chosen, first, scales, most)
-    if remaining(chosen) < worth.LOUD:  # what leaves more has not found its largest effects yet
+    if remaining(chosen) < worth.LOUD and not held(chosen):  # what leaves more lacks its largest effects yet
         chosen = together(chosen, scales, beside if chosen is before else None)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
     if (more := trade.two_for_one(chosen, others, scales, TOGETHER)) is not chosen:
@@ -82,7 +84,7 @@ def searched(bare: Fit, scales: Scales) -> Search:
     found = Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others)))
     found = plainest(believed(likeliest(found)))
     stands = found.chosen
-    if set(stands.names) != set(chosen.names) and remaining(stands) < worth.LOUD:
+    if set(stands.names) != set(chosen.names) and remaining(stands) < worth.LOUD and not held(stands):
         stands = together(stands, scales)  # what an exchanged effect hid
     if (chosen := fewest(stands)) is found.chosen:
         return found
@@ -114,7 +116,8 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
     """
     chosen, better = bare, first
     while better and worth.is_worth(bare, chosen, best := trade.foremost(better)):
-        best = candidates.in_other_laws(candidates.exchanged(best, scales)) if len(best.names) > 1 else best
+        if len(best.names) > 1 and not held(best):
+            best = candidates.in_other_laws(candidates.exchanged(best, scales))
         chosen = settling.settled(best, bare.data)
         chosen = by_impacts(bare, chosen)
         while count(chosen) < MOST and (more := settling.beside_colour(chosen, scales)):
@@ -125,7 +128,9 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
                 return bare, bare, first, None
         if count(chosen) >= MOST or worth.enough(bare, chosen):
             return bare, chosen, first, None
-        better = candidates.best_laws(chosen, scales)
+        # beside a loop of many parts first laws show what else there is: others take as long as all before
+        further = candidates.extended if held(chosen) else candidates.best_laws
+        better = further(chosen, scales)
     return bare, chosen, first, better
 
 
@@ -139,8 +144,8 @@ def by_impacts(bare: Fit, fit: Fit) -> Fit:
 
 
 def count(fit: Fit) -> int:
-    """How many effects of a fit can imitate something else."""
-    return sum(not fit.data.catalogue[name].motionless for name in fit.names)
+    """How many effects of a fit can imitate something else; those that were found together as one loop are one."""
+    return sum(not fit.data.catalogue[name].motionless for name in single(fit)) + bool(held(fit))
 
 
 def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fit:
@@ -203,9 +208,12 @@ def cleared(fit: Fit, stays: Callable[[Fit, Fit], bool]) -> Fit:
     whole gap would be worth nothing either.
     """
     sizes = map(np.max, worth.changes(fit))
+    whole = held(fit)
     for _, name in sorted(zip(sizes, fit.names, strict=True)):
         if len(fit.names) < 2:
             break
+        if name in whole:
+            continue
         less = candidates.without(fit, name)
         if not (is_there(fit, less, name) or stays(less, fit)):
             fit = less

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
 WORKERS = 2
@@ -24,6 +25,17 @@ def each(work: Callable[[Given], Found], items: Iterable[Given]) -> list[Found]:
         return [work(item) for item in given]
     with ThreadPoolExecutor(WORKERS, initializer=mark) as pool:
         return list(pool.map(work, given))
+
+
+@contextmanager
+def unshared() -> Iterator[None]:
+    """While it lasts `each` shares nothing out: for work so short that threads would wait for each other."""
+    before = getattr(_here, "shared", False)
+    mark()
+    try:
+        yield
+    finally:
+        _here.shared = before
 
 
 def mark() -> None:

@@ -16,6 +16,7 @@ from diagnosis.fits import candidates, fitting, worth
 from diagnosis.fits.fitting import TIED, Fit, excess
 from diagnosis.fits.hypothesis import Problem, left_out
 from diagnosis.fits.laws.best import descended, raced
+from diagnosis.fits.laws.loop import held, single
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import leaves
@@ -114,7 +115,7 @@ def simplest(fits: Sequence[Fit]) -> tuple[Fit, tuple[Fit, ...]]:
 def joined(fit: Fit, scales: Scales) -> list[Fit]:
     """Fits with one effect in the place of two of three."""
     result = []
-    for gone in itertools.combinations(fit.names, 2):
+    for gone in itertools.combinations(single(fit), 2):
         kept = {name: values for name, values in fit.values.items() if name not in gone}
         if kept:
             less = fitting.fit(fit.data, kept, fit.z)
@@ -146,7 +147,7 @@ def under_others(fit: Fit) -> list[Fit]:
     chosen first or where the first law with that other effect leaves nothing.
     """
     result: list[Fit] = []
-    for gone, name in itertools.permutations(fit.names, 2):
+    for gone, name in itertools.permutations(single(fit), 2):
         if len(fit.data.catalogue[name].laws) > 1:
             rest = {key: values for key, values in fit.values.items() if key not in (gone, name)}
             less = fitting.fit(fit.data, rest | {name: fit.values[name]}, fit.z)
@@ -163,7 +164,7 @@ def parted(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:
     formulas = {name: fit.data.catalogue[name].law(values) for name, values in fit.values.items()}
     whole = {held for name, law in formulas.items() if law and law.beside for held in (name, *law.beside)}
     for name, values in fit.values.items():
-        if not values.get("law") or name in whole:
+        if not values.get("law") or name in whole or name in held(fit):
             continue
         usual = fit.data.catalogue[name].under(0, values)
         plain = fitting.fit(fit.data, fit.values | {name: usual}, fit.z)

@@ -112,8 +112,9 @@ def of_platform(fit: Fit, part: LaboratoryPart, system: System) -> list[Equation
 def servo_alone(system: System) -> bool:
     """Whether a table is a servo loop of second order alone, so that its acceleration follows from its motion."""
     effects = system.effects.table
-    plain = math.isinf(effects.oil_frequency) and effects.compliance == effects.backlash == 0.0
-    return plain and math.isfinite(system.plan.table.frequency)
+    rigid = math.isinf(effects.oil_frequency) and math.isinf(effects.second_frequency)
+    plain = effects.compliance == effects.backlash == effects.feed_velocity == 0.0
+    return rigid and plain and math.isfinite(system.plan.table.frequency)
 
 
 def platform_acceleration(system: System, command: Array, motion: Array, rate: Array) -> Array:

@@ -139,7 +139,8 @@ class LaboratoryPart:
         self.wanted = self.targets(record)
         self.measured, self.present = outputs(record, self.signals)
         machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]
-        names = tuple(name for machine in machines for name in machine.parameters)
+        seen = [machine for machine in machines if self.shows(record, machine)]
+        names = tuple(name for machine in seen for name in machine.parameters)
         self.channels = channels(record.stated, lab)
         self.free = nothing_stated(record.mapped, lab)
         self._interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
@@ -148,7 +149,7 @@ class LaboratoryPart:
         sites = [
             f"sensor.{channel}" for name, channel, read in pairs if np.ptp(read) > 0.0 and record.has(name)
         ]
-        sites += [machine.site for machine in machines if self.shows(record, machine)]
+        sites += [machine.site for machine in seen]
         self.candidates = of_sites(record, set(map(lab.site, sites)), lab.plan)
         command = self.inputs[next(iter(self.inputs))]
         first, most = command[0], np.max(np.abs(command))

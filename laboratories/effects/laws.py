@@ -23,6 +23,7 @@ def factor_on(
     bounds: tuple[float, float],
     sizes: tuple[float, ...],
     meaning: str = "",
+    **more: Any,
 ) -> Effect:
     """The effect `site.thing` with one parameter, `factor`, which is 1 without the effect.
 
@@ -35,9 +36,10 @@ def factor_on(
         bounds: smallest and largest factor that is physically possible.
         sizes: factors on both sides of 1, from which a search starts.
         meaning: the quantity that the factor multiplies, if `says` does not make that clear.
+        more: further fields of `Effect`.
     """
     parameter = Parameter("factor", "", 1.0, *bounds, sizes, meaning)
-    return Effect(f"{site}.{thing}", site, "physics", says, (parameter,), reference, apply)
+    return Effect(f"{site}.{thing}", site, "physics", says, (parameter,), reference, apply, **more)
 
 
 def sets(
@@ -125,7 +127,9 @@ def extra_time(name: str, sizes: tuple[float, ...]) -> Parameter:
     return Parameter(name, "s", null=0.0, least=-0.05, most=0.2, sizes=sizes, says="added")
 
 
-def adds(site: str, thing: str, key: str, parameter: Parameter, *, says: str, reference: str) -> Effect:
+def adds(
+    site: str, thing: str, key: str, parameter: Parameter, *, says: str, reference: str, **more: Any
+) -> Effect:
     """The effect `site.thing` that adds to the parameter `key` of the plan's table of that name, in total not below 0.
 
     Args:
@@ -135,6 +139,7 @@ def adds(site: str, thing: str, key: str, parameter: Parameter, *, says: str, re
         parameter: the parameter that is added.
         says: a short description of the effect.
         reference: a source or an equation.
+        more: further fields of `Effect`.
     """
     law = partial(added, table=site, key=key)
-    return Effect(f"{site}.{thing}", site, "physics", says, (parameter,), reference, law)
+    return Effect(f"{site}.{thing}", site, "physics", says, (parameter,), reference, law, **more)

@@ -34,6 +34,7 @@ from laboratories.table.record import (
     OFFSET,
     OPENING,
     PRESLIDING,
+    ROWS,
     SECOND,
     SHAPE,
     SOFT,
@@ -77,6 +78,11 @@ def carry(columns: Array, state: Array, free: Array) -> None:
         h += columns[column, 7] * value
     free[0], free[1], free[2], free[3] = a, b, c, d
     free[4], free[5], free[6], free[7] = e, f, g, h
+    for row in range(ROWS, free.size):
+        beyond = 0.0
+        for column in range(columns.shape[0] - 2):
+            beyond += columns[column, row] * state[column]
+        free[row] = beyond
 
 
 @jit

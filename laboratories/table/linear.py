@@ -13,7 +13,9 @@ from models.system import TableEffects
 
 TABLE, TABLE_RATE, STROKE, STROKE_RATE, MOTOR, ACCELERATION = range(6)
 BASE, BASE_RATE = 6, 7  # the table below an oil column's resonance, where there is one
+SWING, SWING_RATE = 8, 9  # how far a mass that swings on the platform is ahead of it, where there is one
 RAMP, PUSH, RAIL, DRAG = range(4)  # inputs: table command, motor force N, force g N, table friction m/s²
+FLOW = 1.0  # the law of `table.second_mass` of a loop that gives way at a speed
 BEHIND_LOOP = 1.0  # the law of `table.backlash` with the play between loop and platform
 INPUTS = 5  # columns behind the states: command before and after, motor command, g, table friction
 
@@ -25,8 +27,10 @@ def propagation(length: float, table: ShakingTable, damper: Damper, effects: Tab
     nulls = {
         "backlash_law": 0.0,
         "compliance": 0.0,
+        "feed_velocity": 0.0,
         "friction": 0.0,
         "oil_frequency": math.inf,
+        "second_frequency": math.inf,
         "velocity_limit": math.inf,
         "learned": (),
     }
@@ -52,14 +56,38 @@ def damper_rows(a: Array, b: Array, damper: Damper) -> None:
         b[MOTOR, PUSH] = 1.0 / damper.motor_time_constant
 
 
+def states(effects: TableEffects) -> int:
+    """How many states a table has with its effects."""
+    if not math.isinf(effects.second_frequency):
+        return 10
+    return 6 if math.isinf(effects.oil_frequency) else 8
+
+
+def swinging(a: Array, b: Array, rate: int, omega: float, effects: TableEffects) -> None:
+    """Fill the row of a mass that swings on the platform, whose acceleration is left out, and its pull at the loop."""
+    second = 2.0 * math.pi * effects.second_frequency
+    damped = 2.0 * effects.second_damping * second
+    a[SWING, SWING_RATE] = 1.0
+    a[SWING_RATE, SWING], a[SWING_RATE, SWING_RATE] = -(second**2), -damped
+    share = effects.second_share
+    if effects.second_law == FLOW:
+        a[rate, SWING_RATE] += share / (1.0 - share) * second**2 / omega
+        return
+    a[rate, SWING] += share * second**2
+    a[rate, SWING_RATE] += share * damped
+    a[rate] /= 1.0 - share
+    b[rate] /= 1.0 - share
+
+
 def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: TableEffects) -> Array:
     """Propagation over one segment of `length` s for a table of second order; shape (n, n + 5).
 
     Under the damper's force F the table gives way as if its command were changed by compliance·F.
     With an oil column the platform follows the table below it as a second oscillator, or by a share σ of its motion:
     ÿ = (1 − σ)·ẍ + ω_o²·(x − y) + 2ζ_o·ω_o·((1 − σ)·ẋ − ẏ), with x the motion of the table below it.
+    A mass that swings on the platform pulls at the loop, as the damper does.
     """
-    size = 6 if math.isinf(effects.oil_frequency) else 8
+    size = states(effects)
     place, rate = (TABLE, TABLE_RATE) if size == 6 else (BASE, BASE_RATE)
     omega = 2.0 * math.pi * table.frequency
     a, b = np.zeros((size, size)), np.zeros((size, 4))
@@ -74,18 +102,24 @@ def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: 
         b[rate, PUSH] -= yielding
     else:
         a[rate, MOTOR] -= yielding
-    if size == 8:
-        oil = 2.0 * math.pi * effects.oil_frequency
+    if size > SWING:
+        swinging(a, b, rate, omega, effects)
+    if size > BASE:
+        rigid = math.isinf(effects.oil_frequency)  # no oil column: the platform is where the loop is
+        oil = omega if rigid else 2.0 * math.pi * effects.oil_frequency
         a[TABLE, TABLE_RATE] = 1.0
         a[TABLE_RATE, TABLE], a[TABLE_RATE, TABLE_RATE] = -(oil**2), -2.0 * effects.oil_damping * oil
         a[TABLE_RATE, BASE] = oil**2
-        straight = 1.0 - effects.oil_share
+        straight = 1.0 if rigid else 1.0 - effects.oil_share
         if straight != 0.0:
             a[TABLE_RATE] += straight * a[rate]
             a[TABLE_RATE, BASE_RATE] += straight * 2.0 * effects.oil_damping * oil
             b[TABLE_RATE] += straight * b[rate]
         if effects.backlash_law == BEHIND_LOOP:  # dashpots of flanks are between the two
             a[TABLE_RATE, BASE_RATE] = 2.0 * effects.oil_damping * oil
+    if size > SWING:
+        a[SWING_RATE] -= a[TABLE_RATE]
+        b[SWING_RATE] -= b[TABLE_RATE]
     damper_rows(a, b, damper)
     a[STROKE_RATE] -= a[TABLE_RATE]
     b[STROKE_RATE] -= b[TABLE_RATE]

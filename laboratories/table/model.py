@@ -33,10 +33,16 @@ from laboratories.table.linear import (
 from laboratories.table.record import (
     BEHIND,
     BRISTLES,
+    FED,
+    FED_ACCELERATION,
+    FED_RATE,
+    FED_TICKS,
+    FED_VELOCITY,
     FORCE_LIMIT,
     FORCE_LIMIT_SHARPNESS,
     HELD,
     IDEAL,
+    LAST_COMMAND,
     LAST_VELOCITY,
     MEMORIES,
     MOTOR_GAIN,
@@ -51,6 +57,7 @@ from laboratories.table.record import (
 from laboratories.table.steady import steady
 from models import preisach
 from models.compiled import jit
+from models.registry import Array
 from models.saturation import saturated
 from models.system import DamperEffects, TableEffects
 from models.transfer_systems import delay
@@ -81,7 +88,7 @@ def build(
     taps, memory, lengths, walk = segments.divided(interval, table.delay, numbers)
     rows = np.stack([propagation(float(length), table, damper, on_table) for length in lengths])
     size = rows.shape[1]
-    columns = np.zeros((len(rows), size + INPUTS, ROWS))
+    columns = np.zeros((len(rows), size + INPUTS, max(size, ROWS)))
     columns[:, :, :size] = rows.transpose(0, 2, 1)
     before, behind = plays(on_table)
     limits = [float(present), on_table.gain, before, on_table.friction, on_damper.gain]
@@ -93,6 +100,7 @@ def build(
     limits += [on_damper.presliding, *behind, on_damper.stop_exponent, on_damper.stop_damping]
     limits += [on_damper.force_limit_sharpness]
     limits += [*valve(table, on_table), on_damper.asymmetry, *behind_coupling, on_table.presliding]
+    limits += fed(interval, table, on_table)
     return TableLab(
         taps,
         walk,
@@ -102,7 +110,7 @@ def build(
         np.array(limits),
         np.zeros(memory),
         np.zeros(size + INPUTS + MEMORIES),
-        np.zeros(ROWS),
+        np.zeros(columns.shape[2]),
         law,
         preisach.memory(law),
         braked,
@@ -124,6 +132,16 @@ def valve(table: ShakingTable, effects: TableEffects) -> tuple[float, float, flo
         return math.inf, 0.0, 0.0
     omega, twice = 2.0 * math.pi * table.frequency, 2.0 * table.damping_ratio
     return effects.velocity_limit, omega / twice, twice * omega
+
+
+def fed(interval: float, table: ShakingTable, effects: TableEffects) -> tuple[float, float, float, float]:
+    """What `limits` holds of velocity and acceleration of the command that are fed forward, from place `FED` on."""
+    if effects.feed_velocity == 0.0 or math.isinf(table.frequency):
+        return 0.0, 0.0, 0.0, 0.0
+    omega = 2.0 * math.pi * table.frequency
+    velocity = effects.feed_velocity * 2.0 * table.damping_ratio / omega
+    share = -math.expm1(-interval / effects.feed_lag)
+    return share, 1.0 / interval, velocity, effects.feed_acceleration / omega**2
 
 
 @jit
@@ -152,6 +170,8 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
         wanted = limits[MOTOR_GAIN] * motor_command
         state[motor] = saturated(wanted, limits[FORCE_LIMIT], limits[FORCE_LIMIT_SHARPNESS])
         command *= limits[TABLE_GAIN]
+        if limits[FED] > 0.0:
+            command += fed_forward(limits, state, size, command)
     delay.remember(history, command)
     state[after] = delay.delayed(history, taps, 0)
     if limits[PLAY] > 0.0:
@@ -177,6 +197,16 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
     force = spring[0] * state[STROKE] + spring[1] * state[STROKE_RATE] + state[rail] - state[MOTOR]
     force += state[size + INPUTS + HELD]  # which acts between the two masses
     return state[TABLE], state[ACCELERATION], state[STROKE], force
+
+
+@jit
+def fed_forward(limits: Array, state: Array, size: int, command: float) -> float:
+    """What is fed forward (m) of velocity and acceleration of a command (m), by differences behind a filter."""
+    last, rate = size + INPUTS + LAST_COMMAND, size + INPUTS + FED_RATE
+    gained = limits[FED] * ((command - state[last]) * limits[FED_TICKS] - state[rate])
+    state[last] = command
+    state[rate] += gained
+    return float(limits[FED_VELOCITY] * state[rate] + limits[FED_ACCELERATION] * gained * limits[FED_TICKS])
 
 
 @jit

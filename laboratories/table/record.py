@@ -29,10 +29,13 @@ ASYMMETRY = 30  # of the damper's dashpot
 # whole mass over the first one
 SECOND, COUPLING, COUPLED_RATE, GAP, WHOLE = 31, 32, 33, 34, 35
 TABLE_PRESLIDING = 36  # m, of the table's friction
+# of what is fed forward: the share of a change of rate that passes the filter in an interval, 0 where nothing is fed
+# forward, ticks per s, the velocity's time s, and the acceleration's s²
+FED, FED_TICKS, FED_VELOCITY, FED_ACCELERATION = 37, 38, 39, 40
 
 # places in `state` behind the states and inputs
-PLAYED, LAST_VELOCITY, BRISTLES, APART, APART_RATE, HELD, TABLE_BRISTLES = range(7)
-MEMORIES = 7
+PLAYED, LAST_VELOCITY, BRISTLES, APART, APART_RATE, HELD, TABLE_BRISTLES, LAST_COMMAND, FED_RATE = range(9)
+MEMORIES = 9
 ROWS = 8  # of a column: as many with an oil column as without one, so that they are carried side by side
 
 
@@ -42,17 +45,20 @@ class TableLab(NamedTuple):
     taps: Array  # of the delayed command, at the shortest segments' borders
     # (levels, borders, 2): from a border on, by level, the place of the segment's length, -1 for none, and its end
     walk: Whole
-    # (m, n + 5, ROWS): what state, command before and after, motor command, g and table friction add to the next state
+    # (m, n + 5, rows), rows = `ROWS`, or n where that is more: what state, command before and after, motor command, g
+    # and table friction add to the next state
     columns: Array
     lengths: Array  # (m,) of segments, s
     spring: Array  # (stiffness N/m, dashpot N·s/m) of the damper
     limits: Array  # effects that are not in the matrices
     history: Array  # table commands written, newest first
-    # (n + 12,), n = 6, or 8 with an oil column: behind the states the inputs, the command after the play, an ideal
-    # table's last velocity, the force of the rail's bristles, of a mass behind a coupling how far it is ahead of the
-    # first one, the rate of that, and the coupling's force on the first one, and what the bearings' bristles brake by
+    # (n + 14,), n = 6, 8 with an oil column, or 10 with a mass that swings on the platform: behind the states the
+    # inputs, the command after the play, an ideal table's last velocity, the force of the rail's bristles, of a mass
+    # behind a coupling how far it is ahead of the first one, the rate of that, and the coupling's force on the first
+    # one, what the bearings' bristles brake by, and of what is fed forward the last command and its rate behind the
+    # filter
     state: Array
-    free: Array  # (ROWS,): the states at a segment's end without g and the table's friction
+    free: Array  # (rows,): the states at a segment's end without g and the table's friction
     learned: Array  # a law of `models.preisach` of the stroke, empty for none
     learned_memory: Array
     braked: Array  # a law of the table's motion, m/s², empty for none

@@ -320,7 +320,15 @@ def test_a_damper_that_hits_its_end_stop_solves_its_equation(stiffness: float) -
 
 
 ALL_TABLE = TableEffects(
-    gain=1.05, oil_frequency=16.0, oil_damping=0.1, compliance=6e-6, backlash=4e-4, friction=0.1
+    gain=1.05,
+    feed_velocity=0.5,
+    feed_acceleration=0.4,
+    oil_frequency=16.0,
+    oil_damping=0.1,
+    second_frequency=5.0,
+    compliance=6e-6,
+    backlash=4e-4,
+    friction=0.1,
 )
 ALL_DAMPER = DamperEffects(
     gain=0.93, friction=3.0, offset=2.0, force_limit=35.0, stop_stroke=0.03, stop_stiffness=2000.0

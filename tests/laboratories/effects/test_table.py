@@ -78,6 +78,61 @@ def test_a_share_of_the_motion_passes_through_the_oil_column(frequency: float, s
     assert phasor(got[:, ACCELERATION], t, frequency, 4.0) == pytest.approx(s**2 * found, rel=2e-2)
 
 
+@pytest.mark.parametrize("frequency", [2.0, 9.0, 14.0])
+@pytest.mark.parametrize(("velocity", "acceleration", "lag"), [(0.9, 0.8, 2e-3), (-0.5, 0.0, 6e-3)])
+@pytest.mark.parametrize("oil", [math.inf, 20.0])
+def test_velocity_and_acceleration_fed_forward_have_their_transfer_function(
+    frequency: float, velocity: float, acceleration: float, lag: float, oil: float
+) -> None:
+    t = np.arange(1, 4001) * DT
+    command = 5e-3 * np.cos(2.0 * np.pi * frequency * t) * np.minimum(t, 1.0)
+    more = TableEffects(
+        feed_velocity=velocity, feed_acceleration=acceleration, feed_lag=lag, oil_frequency=oil
+    )
+    got = run_b(command, damper=STILL, table_effects=more)
+    s, omega = 2j * math.pi * frequency, 2.0 * math.pi * 15.0
+    back = np.exp(-s * DT)  # to the tick before
+    left = math.exp(-DT / lag)  # what the filter keeps of a rate over an interval
+    rate = (1.0 - left) * (1.0 - back) / DT / (1.0 - left * back)
+    whole = 1.0 + velocity * 1.4 / omega * rate + acceleration / omega**2 * rate * (1.0 - back) / DT
+    ramps = np.sinc(frequency * DT) ** 2
+    expected = np.exp(-0.004 * s) * second_order(s, 15.0, 0.7) * whole * 5e-3 * ramps
+    if not math.isinf(oil):
+        expected *= second_order(s, oil, 0.1)
+    found = phasor(got[:, Y], t, frequency, 4.0)
+    assert abs(found - expected) < 2e-3 * abs(expected)
+    assert phasor(got[:, ACCELERATION], t, frequency, 4.0) == pytest.approx(s**2 * found, rel=2e-2)
+
+
+@pytest.mark.parametrize("frequency", [2.0, 4.0, 9.0])
+@pytest.mark.parametrize("law", [0.0, 1.0])
+@pytest.mark.parametrize(("oil", "share"), [(math.inf, 1.0), (17.0, 1.0), (17.0, 0.2)])
+def test_a_mass_that_swings_on_the_platform_pulls_at_its_loop(
+    frequency: float, law: float, oil: float, share: float
+) -> None:
+    t = np.arange(1, 6001) * DT
+    command = 5e-3 * np.cos(2.0 * np.pi * frequency * t) * np.minimum(t, 1.0)
+    more = TableEffects(
+        second_frequency=4.2,
+        second_share=0.3,
+        second_damping=0.05,
+        second_law=law,
+        oil_frequency=oil,
+        oil_share=share,
+    )
+    got = run_b(command, damper=STILL, table_effects=more)
+    s, omega, second = 2j * math.pi * frequency, 2.0 * math.pi * 15.0, 2.0 * math.pi * 4.2
+    ahead = -(s**2) / (s**2 + 0.1 * second * s + second**2)  # of the mass, over the platform's motion
+    pull = 0.3 * (second**2 + 0.1 * second * s if law == 0.0 else second**2 * s / omega / 0.7) * ahead
+    platform = 1.0 - share + share * second_order(s, oil, 0.1) if math.isfinite(oil) else 1.0
+    loop = (0.7 if law == 0.0 else 1.0) * s**2 + 1.4 * omega * s + omega**2
+    expected = np.exp(-0.004 * s) * omega**2 * platform / (loop - pull * platform)
+    expected *= 5e-3 * np.sinc(frequency * DT) ** 2
+    found = phasor(got[:, Y], t, frequency, 8.0)
+    assert abs(found - expected) < 2e-3 * abs(expected)
+    assert phasor(got[:, ACCELERATION], t, frequency, 8.0) == pytest.approx(s**2 * found, rel=2e-2)
+
+
 def test_a_table_whose_valve_saturates_follows_as_another_solver_says() -> None:
     limit, omega, ratio, size, pace = 0.04, 2.0 * math.pi * 15.0, 0.7, 0.01, 2.0 * math.pi * 1.5
 
@@ -302,6 +357,8 @@ def test_a_learned_force_of_the_tables_motion_acts_against_it() -> None:
         ("compliance", TableEffects(compliance=1e-6)),
         ("friction", TableEffects(friction=0.1)),
         ("oil_frequency", TableEffects(oil_frequency=25.0)),
+        ("feed_velocity", TableEffects(feed_velocity=0.5)),
+        ("second_frequency", TableEffects(second_frequency=4.0)),
         ("learned", TableEffects(learned=(0.0,) * 16)),
     ],
 )

@@ -19,4 +19,5 @@ EFFECT = factor_on(
     bounds=(0.1, 10.0),
     sizes=(0.5, 0.7, 0.9, 1.1, 1.4, 2.0),
     meaning="on ω",
+    of_loop=True,
 )

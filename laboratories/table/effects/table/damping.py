@@ -19,4 +19,5 @@ EFFECT = factor_on(
     bounds=(0.05, 20.0),
     sizes=(0.5, 0.75, 0.9, 1.15, 1.5, 2.5),
     meaning="on ζ",
+    of_loop=True,
 )

@@ -17,4 +17,5 @@ EFFECT = adds(
     extra_time("delay", (-0.003, -0.001, 0.001, 0.003, 0.008, 0.02)),
     says="dead time of the table is longer or shorter",
     reference="Y(s) = e^(−(L + delay)·s)·ω²/(s² + 2ζω·s + ω²)·U(s)",
+    of_loop=True,
 )

@@ -54,4 +54,5 @@ EFFECT = sets(
     ),
     says="a resonance on top of the table's loop",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",
+    of_loop=True,
 )

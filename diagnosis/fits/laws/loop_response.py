@@ -1,0 +1,83 @@
+"""The readings of a shaking table as spectra, which its linear models predict from the spectrum of its command.
+
+It stands in for the table's part where a fit has a long way to go: a spectrum takes a tenth of the time of a replay,
+and all that is linear in a loop acts on each of its lines by itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.recorded.parts import LaboratoryPart, Measured
+from diagnosis.signals.mask import Mask
+from laboratories.table import transfer
+from models.registry import Array
+from models.system import SensorEffects, System
+
+Spectrum = npt.NDArray[np.complex128]
+
+# Hz, of the lines that count: zeros of sensors and their drift stand below, mostly noise above. AT_TICKS is the share
+# of the sampling rate above which straight lines between samples carry little of a motion.
+LOWEST, HIGHEST, AT_TICKS = 0.15, 40.0, 0.35
+THERE = 0.95  # of its samples that a reading must have
+READ = ("table_displacement", "table_acceleration")
+
+
+class LoopResponse(Measured):
+    """The spectra of a table's readings, (2·lines, readings): real parts, and below them imaginary parts."""
+
+    name = "response"
+    exact = False
+
+    def __init__(self, part: LaboratoryPart, interval: float) -> None:
+        names = part.lab.kind.channels.names
+        shown = part.present.mean(axis=0) > THERE
+        places = [place for place, name in enumerate(names) if name in READ and shown[place]]
+        self.role, self.nuisances, self.candidates = part.role, part.nuisances, part.candidates
+        self.signals = tuple(part.signals[place] for place in places)
+        self._names, self._interval = [names[place] for place in places], interval
+        ticks = len(part.measured)
+        frequencies = np.fft.rfftfreq(ticks, interval)
+        self._lines = (frequencies > LOWEST) & (frequencies < min(HIGHEST, AT_TICKS / interval))
+        self._s = np.asarray(2j * np.pi * frequencies[self._lines], dtype=np.complex128)
+        command = self.spectrum(part.inputs[next(iter(part.inputs))])
+        first = np.zeros(ticks)
+        first[0] = 1.0
+        self._commands = [
+            command * np.fft.rfft(part.channels[place].through(first, interval))[self._lines]
+            for place in places
+        ]
+        self.measured = np.stack([apart(self.spectrum(part.measured[:, place])) for place in places], axis=1)
+        self.present: Mask = np.ones(self.measured.shape, dtype=bool)
+
+    def spectrum(self, values: Array) -> Spectrum:
+        """The lines of a series (ticks,), scaled so that the parts of white noise keep its rms."""
+        return np.asarray(np.fft.rfft(values - values[0])[self._lines] * np.sqrt(2.0 / values.size))
+
+    def predict(self, system: System) -> Array:
+        """Spectra of the readings."""
+        before = np.exp(-self._s * self._interval)  # a reading is taken before the command of its tick acts
+        moved = before * transfer.displacement(
+            self._s, self._interval, system.plan.table, system.effects.table
+        )
+        columns = []
+        for name, command in zip(self._names, self._commands, strict=True):
+            motion = moved if name == READ[0] else self._s**2 * moved
+            columns.append(apart(motion * command * self.sensed(system.effects.sensors.get(name))))
+        return np.stack(columns, axis=1)
+
+    def sensed(self, effects: SensorEffects | None) -> Spectrum | float:
+        """A reading over what its sensor sees."""
+        if effects is None:
+            return 1.0
+        return np.asarray(effects.gain * np.exp(-effects.delay * self._s) / (1.0 + effects.lag * self._s))
+
+    def first(self, ticks: int) -> LoopResponse:
+        """The whole of it, because a spectrum has no beginning."""
+        return self
+
+
+def apart(values: Spectrum) -> Array:
+    """Real parts (n,) of a spectrum, and below them its imaginary parts, (2·n,)."""
+    return np.concatenate([values.real, values.imag])
