@@ -197,7 +197,6 @@ def of_building(record: Record, parts: Sequence[Part]) -> list[AlikeReadings]:
         low_pass.spectra(*view.forces_demanded(used=used), interval, 0.5 / interval, noisy=True)
         for used in (False, True)
     )
-    result = [AlikeReadings(MASTER, found.sources, every)]
-    if low_pass.louder(every, own) < BEYOND:
-        result.insert(0, AlikeReadings(MASTER, found.sources[:1], own))
-    return result
+    alone = AlikeReadings(MASTER, found.sources[:1], own)
+    used_others = low_pass.likelier_whole(every, own) < BEYOND
+    return [*([alone] if used_others else []), AlikeReadings(MASTER, found.sources, every)]

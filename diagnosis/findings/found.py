@@ -28,9 +28,7 @@ class Diagnosis:
     link: Sequence[LinkFinding] = ()
     held: Mapping[str, float] = field(default_factory=dict)  # sensors that repeat samples, and how many
     white: Mapping[str, float] = field(default_factory=dict)  # rms of each reading's noise, lines aside
-    lines: Mapping[str, float] = field(
-        default_factory=dict
-    )  # rms of the narrow lines that each reading picks up
+    lines: Mapping[str, float] = field(default_factory=dict)  # rms of narrow lines that each reading picks up
     warnings: Sequence[str] = ()
     learned: Sequence[LearnedLaw] = ()  # what no effect explains
 

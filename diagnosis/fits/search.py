@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.fits import candidates, contact, fitting, hypothesis, settling, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.laws.coupled import coupled
-from diagnosis.fits.laws.loop import held, single, whole_loops
+from diagnosis.fits.laws.loop import of_one_loop, single, whole_loops
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
@@ -75,7 +75,9 @@ def searched(bare: Fit, scales: Scales) -> Search:
     chosen = pruned(bare, chosen)
     most = MOST + len(chosen.names) - count(chosen)
     chosen, as_good = trade.traded(bare, chosen, first, scales, most)
-    if remaining(chosen) < worth.LOUD and not held(chosen):  # what leaves more lacks its largest effects yet
+    if remaining(chosen) < worth.LOUD and not of_one_loop(
+        chosen
+    ):  # what leaves more lacks its largest effects yet
         chosen = together(chosen, scales, beside if chosen is before else None)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
     if (more := trade.two_for_one(chosen, others, scales, TOGETHER)) is not chosen:
@@ -84,7 +86,7 @@ def searched(bare: Fit, scales: Scales) -> Search:
     found = Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others)))
     found = plainest(believed(likeliest(found)))
     stands = found.chosen
-    if set(stands.names) != set(chosen.names) and remaining(stands) < worth.LOUD and not held(stands):
+    if set(stands.names) != set(chosen.names) and remaining(stands) < worth.LOUD and not of_one_loop(stands):
         stands = together(stands, scales)  # what an exchanged effect hid
     if (chosen := fewest(stands)) is found.chosen:
         return found
@@ -116,7 +118,7 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
     """
     chosen, better = bare, first
     while better and worth.is_worth(bare, chosen, best := trade.foremost(better)):
-        if len(best.names) > 1 and not held(best):
+        if len(best.names) > 1 and not of_one_loop(best):
             best = candidates.in_other_laws(candidates.exchanged(best, scales))
         chosen = settling.settled(best, bare.data)
         chosen = by_impacts(bare, chosen)
@@ -129,7 +131,7 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
         if count(chosen) >= MOST or worth.enough(bare, chosen):
             return bare, chosen, first, None
         # beside a loop of many parts first laws show what else there is: others take as long as all before
-        further = candidates.extended if held(chosen) else candidates.best_laws
+        further = candidates.extended if of_one_loop(chosen) else candidates.best_laws
         better = further(chosen, scales)
     return bare, chosen, first, better
 
@@ -145,7 +147,7 @@ def by_impacts(bare: Fit, fit: Fit) -> Fit:
 
 def count(fit: Fit) -> int:
     """How many effects of a fit can imitate something else; those that were found together as one loop are one."""
-    return sum(not fit.data.catalogue[name].motionless for name in single(fit)) + bool(held(fit))
+    return sum(not fit.data.catalogue[name].motionless for name in single(fit)) + bool(of_one_loop(fit))
 
 
 def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fit:
@@ -208,7 +210,7 @@ def cleared(fit: Fit, stays: Callable[[Fit, Fit], bool]) -> Fit:
     whole gap would be worth nothing either.
     """
     sizes = map(np.max, worth.changes(fit))
-    whole = held(fit)
+    whole = of_one_loop(fit)
     for _, name in sorted(zip(sizes, fit.names, strict=True)):
         if len(fit.names) < 2:
             break

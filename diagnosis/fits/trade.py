@@ -16,7 +16,7 @@ from diagnosis.fits import candidates, fitting, worth
 from diagnosis.fits.fitting import TIED, Fit, excess
 from diagnosis.fits.hypothesis import Problem, left_out
 from diagnosis.fits.laws.best import descended, raced
-from diagnosis.fits.laws.loop import held, single
+from diagnosis.fits.laws.loop import of_one_loop, single
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import leaves
@@ -164,7 +164,7 @@ def parted(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:
     formulas = {name: fit.data.catalogue[name].law(values) for name, values in fit.values.items()}
     whole = {held for name, law in formulas.items() if law and law.beside for held in (name, *law.beside)}
     for name, values in fit.values.items():
-        if not values.get("law") or name in whole or name in held(fit):
+        if not values.get("law") or name in whole or name in of_one_loop(fit):
             continue
         usual = fit.data.catalogue[name].under(0, values)
         plain = fitting.fit(fit.data, fit.values | {name: usual}, fit.z)

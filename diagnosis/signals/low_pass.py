@@ -143,7 +143,7 @@ def response(channel: ImportedChannel, frequency: Array, interval: float) -> Lin
     return turns * sum((n + b * back) / (1.0 - k * back) for n, b, k in zip(now, before, kept, strict=True))
 
 
-def louder(of: ReadSpectra, less: ReadSpectra) -> float:
+def likelier_whole(of: ReadSpectra, less: ReadSpectra) -> float:
     """2·log of how much likelier what readings would be is by itself than with what was taken from it in `less`.
 
     What takes away a part of a signal leaves less, and what was recorded of that part with noise of its own adds this.

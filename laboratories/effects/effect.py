@@ -108,9 +108,7 @@ class Effect:
     shifts_time: bool = False  # moves a motion in time, so that a search starts at the shift by correlation
     motionless: bool = False  # adds to a reading what no motion causes, as a constant, and so imitates none
     timed: bool = False  # acts on rates, or delays, so that data whose times have no meaning cannot show it
-    of_loop: bool = (
-        False  # a linear part of a servo loop, found with its other parts in the loop's frequency response
-    )
+    of_loop: bool = False  # a linear part of a servo loop, found with its other parts in a frequency response
     starts: Callable[[Plan], tuple[float, ...]] = (
         no_starts  # sizes for plans for which the parameter's own fail
     )

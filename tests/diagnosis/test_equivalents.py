@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from diagnosis.findings.sensors.one_motion import one_place
-from diagnosis.findings.verdict import equivalents, judge, loop_of_several
+from diagnosis.findings.sensors.one_motion import one_motion, one_place
+from diagnosis.findings.verdict import equivalents, judge, loop_of_several, other_cause
 from diagnosis.findings.which import other_causes
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit
@@ -74,4 +76,8 @@ def test_offsets_of_two_readings_may_be_those_of_a_piston_that_stands_elsewhere(
         "sensor.column_force.bias": {"offset": force},
     }
     bare, fit = (fitting.at(data, given, np.zeros(len(data.part.nuisances))) for given in ({}, values))
-    assert one_place(Search(data, bare, fit, ())) is one
+    found = Search(data, bare, fit, ())
+    assert one_place(found) is one
+    assert other_cause(found) is one
+    alone = {name: given for name, given in values.items() if "bias" in name}
+    assert one_motion(replace(found, chosen=fitting.at(data, alone, bare.z))) is one

@@ -86,7 +86,7 @@ def test_a_loop_with_feed_forward_under_a_swinging_mass_is_found_as_a_whole(case
     data = residuals.prepare(table(whole, command, shaken()), whole)
     bare = fitting.fit(data, {})
     (found,) = loop.whole_loops(bare, [bare])
-    assert {"table.feed_forward", "table.second_mass"} < set(loop.held(found))
+    assert {"table.feed_forward", "table.second_mass"} < set(loop.of_one_loop(found))
     assert found.values["table.second_mass"]["frequency"] == pytest.approx(4.2, rel=0.02)
     assert loop.missed(found) < 0.05 * loop.missed(bare)
 

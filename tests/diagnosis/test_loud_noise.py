@@ -11,7 +11,7 @@ from diagnosis.diagnose import examine
 from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import PartVerdict
-from diagnosis.fits import residuals
+from diagnosis.fits import fitting, residuals, sensor_noise, settling
 from tests.diagnosis.cases import Cases, lab_a, lab_b, moved_by, white
 
 STEP = 4e-5  # m, of the converter that gives a table its command
@@ -53,3 +53,15 @@ def test_an_inertia_that_a_restless_command_hides_in_noise_is_found(cases: Cases
     verdict = on_part(found, part.name)
     assert (verdict.outcome, found.readings) == ("explained", [])
     assert verdict.search.chosen.values["column.inertia"]["mass"] == pytest.approx(1000.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("times", "alone"), [((15.0, 1.2), True), ((15.0, 14.0), False), ((15.0,), True), ((5.0, 0.2), False)]
+)
+def test_noise_stands_out_where_no_other_reading_has_any_like_it(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch, times: tuple[float, ...], alone: bool
+) -> None:
+    whole = cases.record()
+    bare = fitting.at(data := residuals.prepare(lab_a(whole), whole), {}, np.zeros(len(data.part.nuisances)))
+    monkeypatch.setattr(sensor_noise, "loudest", lambda _: np.array(times))
+    assert settling.stands_out(bare) is alone

@@ -35,7 +35,7 @@ LONG = 20  # steps of a fit to the readings
 APART = 1.12  # one frequency of a resonance over the one before it, where it is looked for
 
 
-def held(fit: Fit) -> tuple[str, ...]:
+def of_one_loop(fit: Fit) -> tuple[str, ...]:
     """The effects of a fit that were found together as one loop, of which none is exchanged for another by itself."""
     parts = tuple(name for name in fit.names if fit.data.catalogue[name].of_loop)
     return parts if len(parts) > AS_ONE else ()
@@ -43,7 +43,7 @@ def held(fit: Fit) -> tuple[str, ...]:
 
 def single(fit: Fit) -> tuple[str, ...]:
     """The effects of a fit that were found one by one."""
-    whole = held(fit)
+    whole = of_one_loop(fit)
     return tuple(name for name in fit.names if name not in whole)
 
 
