@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from common.plan.kinds import TABLE
-from common.plan.plan import Plan
 from common.recording.imported import ImportedChannel, LoggerFilter
-from common.roles import MASTER
 from diagnosis.findings.certainty.intervals import FOREIGN, covariance
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors import readings
@@ -70,34 +66,6 @@ def clocked(record: Record) -> Record:
     ]
     fast = clock.common(said)
     return record.put_right(fast) if fast != 0.0 else record
-
-
-def sampled_together(record: Record) -> Record:
-    """An imported record of a table by itself with commands one tick earlier and a dead time that is as much longer.
-
-    The models say the same of it. But a logger samples a command together with the readings, where a controller writes
-    one that is reached an interval later: a table without dead time would have less than none.
-    """
-    if record.stated is None or record.static or record.has("displacement"):
-        return record
-    signals, plans = dict(record.signals), dict(record.plans)
-    for lab in record.labs:
-        command = lab.signal(lab.kind.channels.command.name)
-        if lab.kind.name == TABLE and record.has(command) and math.isfinite(lab.plan.table.frequency):
-            signals[command] = np.append(record.signals[command][1:], record.signals[command][-1])
-            plans[lab.role] = longer(lab.plan)
-    labs = tuple(replace(lab, plan=plans[lab.role]) for lab in record.labs)
-    plan = next((lab.plan for lab in labs if lab.role != MASTER), plans.get(MASTER, record.plan))
-    return replace(record, signals=signals, plan=plan, plans=plans, labs=labs)
-
-
-def longer(plan: Plan) -> Plan:
-    """The plan with a table whose dead time is an interval longer, and known as well as before."""
-    table, known, name = plan.table, plan.tolerances, "table.delay"
-    delay = table.delay + plan.test.interval
-    tolerance = known.parameters.get(name, known.default) * table.delay / delay
-    tolerances = replace(known, parameters={**known.parameters, name: tolerance})
-    return replace(plan, table=replace(table, delay=delay), tolerances=tolerances)
 
 
 def nominal(

@@ -20,6 +20,7 @@ from diagnosis.fits import sensor_noise
 from diagnosis.fits.settling import SMALL
 from diagnosis.recorded.nuisances import LoggedForce, LoggedReadings
 from diagnosis.recorded.record import Record
+from diagnosis.recorded.sampled_together import factor_as_planned
 from diagnosis.report.records import HowFar, Place, Report, Status, Tolerance
 
 # Warning where the effects of a part explain its readings and the test is as far from its simulation as before.
@@ -132,7 +133,8 @@ def tolerances(found: Diagnosis) -> dict[str, Tolerance]:
         for nuisance, z in zip(verdict.search.data.part.nuisances, fit.z, strict=True):
             if isinstance(nuisance, LoggedForce | LoggedReadings):
                 continue
-            result[nuisance.name] = Tolerance(factor=1.0 + float(z) * nuisance.tolerance, z=float(z))
+            factor = factor_as_planned(found.record, nuisance, float(z))
+            result[nuisance.name] = Tolerance(factor=factor, z=float(z))
     return result
 
 

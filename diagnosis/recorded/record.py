@@ -84,6 +84,8 @@ class Record:
     labs: tuple[RecordedLaboratory, ...] = ()  # the laboratories that it shows, the master's first
     held: float | None = None  # test time (s) of the first hold, before which it ends; None without a hold
     fast: float = 0.0  # rate by which the clock of its readings was fast before they were put right
+    # planned dead times (s) of tables whose commands were taken a tick earlier, by role
+    earlier: Mapping[str, float] = field(default_factory=dict)
     late: Late = NOT_LATE  # by which a logger delays all channels of a kind
     # filters of channels that its import map does not state, by topic and name
     passed: Mapping[tuple[str, str], LoggerFilter] = field(default_factory=dict)

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from diagnosis.findings import logger
+from diagnosis.diagnose import put_right
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.laws import loop
 from diagnosis.fits.laws.loop_response import LoopResponse
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
+from diagnosis.recorded.sampled_together import as_planned, factor_as_planned, sampled_together
 from laboratories.effects import CATALOGUE
 from models.registry import Array
 from tests.diagnosis.cases import Cases, imported, lab_b, white
@@ -102,9 +103,28 @@ def test_a_table_that_was_logged_alone_is_the_same_with_its_commands_a_tick_earl
     alone = replace(
         given, signals={name: values for name, values in given.signals.items() if name != "displacement"}
     )
-    moved = logger.sampled_together(alone)
+    moved = sampled_together(alone)
     assert moved.plan.table.delay == alone.plan.table.delay + alone.plan.test.interval
     before, after = lab_b(alone), lab_b(moved)
     read = before.predict(alone.systems[before.role])[:, 0]
     assert np.allclose(after.predict(moved.systems[after.role])[1:, 0], read[1:], atol=1e-9)
-    assert logger.sampled_together(given) is given
+    assert sampled_together(given) is given
+    assert put_right(alone).plan == moved.plan
+
+
+def test_a_dead_time_that_was_found_is_told_as_the_plan_counts_it(cases: Cases) -> None:
+    given = imported(cases.record())
+    kept = ("table_command", "table_displacement", "table_acceleration")
+    moved = sampled_together(replace(given, signals={name: given.signals[name] for name in kept}))
+    part = lab_b(moved)
+    machines = {item.parameter.partition(".")[0] for item in part.nuisances if not item.of_record}
+    assert machines == {"table"}  # of the damper no reading was recorded
+    (delay,) = (item for item in part.nuisances if item.parameter == "table.delay")
+    known = given.plan.tolerances
+    planned_tolerance = known.parameters.get("table.delay", known.default)
+    planned, found = given.plan.table.delay, delay.moved(moved.systems[part.role], 0.7).plan
+    told = as_planned(moved, part.role, found).table.delay
+    assert told == pytest.approx(found.table.delay - given.plan.test.interval, rel=1e-12)
+    assert factor_as_planned(moved, delay, 0.7) == pytest.approx(told / planned, rel=1e-12)
+    assert as_planned(moved, part.role, moved.plans[part.role]).table.delay == planned
+    assert factor_as_planned(moved, delay, 0.7) == pytest.approx(1.0 + 0.7 * planned_tolerance)

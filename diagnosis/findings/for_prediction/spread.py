@@ -18,6 +18,7 @@ from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
 from diagnosis.recorded.loop import NOISY, noised
+from diagnosis.recorded.sampled_together import factor_as_planned
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 
@@ -63,20 +64,27 @@ def part_spread(found: Diagnosis, verdict: PartVerdict) -> PartSpread:
     """The parameters that the fit of a part moved, those of the recording alone left out."""
     fit = verdict.searched.chosen
     problem = Problem(fit.data, fit.values)
-    known: list[tuple[int, UncertainParameter, float]] = [*nominal(fit), *of_effects(found, fit, problem)]
+    known: list[tuple[int, UncertainParameter, float]] = [
+        *nominal(found, fit),
+        *of_effects(found, fit, problem),
+    ]
     places = [place for place, _, _ in known]
     scales = np.array([scale for _, _, scale in known])
     chosen = covariance(fit)[np.ix_(places, places)] if places else np.zeros((0, 0))
     return PartSpread(tuple(one for _, one, _ in known), chosen * np.outer(scales, scales))
 
 
-def nominal(fit: Fit) -> Iterator[tuple[int, UncertainParameter, float]]:
+def nominal(found: Diagnosis, fit: Fit) -> Iterator[tuple[int, UncertainParameter, float]]:
     """Nominal parameters: place in the fit, name, and the relative change of the value per unit of the fit."""
     part = fit.data.part
     for place, item in enumerate(part.nuisances):
         if not item.of_record:
             one = UncertainParameter(part.role, item.parameter, storey=item.storey)
-            yield place, one, item.tolerance / (1.0 + float(fit.z[place]) * item.tolerance)
+            there, beyond = (
+                factor_as_planned(found.record, item, z)
+                for z in (float(fit.z[place]), float(fit.z[place]) + 1.0)
+            )
+            yield place, one, beyond / there - 1.0
 
 
 def of_effects(
