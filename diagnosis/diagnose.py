@@ -34,11 +34,12 @@ from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
 from diagnosis.learned.learn import learn
-from diagnosis.recorded import link, link_effects
 from diagnosis.recorded.divided import BUILDING, driven, parts_of, used
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.joined import joined, refuse_others
-from diagnosis.recorded.link import LinkFinding
+from diagnosis.recorded.link import effects as link_effects
+from diagnosis.recorded.link import exchange
+from diagnosis.recorded.link.exchange import LinkFinding
 from diagnosis.recorded.logged_building import LoggedBuilding, logged
 from diagnosis.recorded.parts import Building, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
@@ -238,7 +239,7 @@ def exchanged(record: Record) -> list[LinkFinding]:
     """Effects of the link that the messages' numbers and time stamps show, where both ends were recorded."""
     if not (record.run.has("master") and record.run.has("slave") and exchange_known(record.run)):
         return []
-    account = link.account(record.run, record.plan.test.interval)
+    account = exchange.account(record.run, record.plan.test.interval)
     return link_effects.findings(account, record.plan.test.interval)
 
 

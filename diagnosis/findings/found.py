@@ -12,7 +12,7 @@ from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.hypothesis import Values
 from diagnosis.learned.learn import LearnedLaw, Of
-from diagnosis.recorded.link import LinkFinding
+from diagnosis.recorded.link.exchange import LinkFinding
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
 from models.system import System

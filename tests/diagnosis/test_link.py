@@ -16,8 +16,8 @@ from common.plan.plan import Plan
 from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
-from diagnosis.recorded.link import LinkFinding, account, exchange_of
-from diagnosis.recorded.link_effects import findings
+from diagnosis.recorded.link.effects import findings
+from diagnosis.recorded.link.exchange import LinkFinding, account, exchange_of
 from loop.closed_loop import on_time
 from loop.exchange import exchange
 from models.link.impaired import ImpairedLink

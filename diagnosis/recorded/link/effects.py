@@ -7,7 +7,8 @@ import math
 import numpy as np
 from scipy.stats import beta
 
-from diagnosis.recorded.link import (
+from diagnosis.recorded.link.ages import LEAST_OLD, scattered
+from diagnosis.recorded.link.exchange import (
     CERTAIN,
     LEAST_STAMPS,
     TINY,
@@ -17,7 +18,6 @@ from diagnosis.recorded.link import (
     certainty,
     scatters,
 )
-from diagnosis.recorded.link_ages import LEAST_OLD, scattered
 from models.registry import Array
 
 LEAST_LOST = 3  # messages on a real clock: one or two may be lost when a process starts or ends

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from diagnosis.recorded.link import Index, Interval, LinkFinding, certainty
+from diagnosis.recorded.link.exchange import Index, Interval, LinkFinding, certainty
 from models.registry import Array
 
 # Share of old messages from which on the link delays or loses some of them; on a real clock a process that wakes late

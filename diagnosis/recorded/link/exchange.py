@@ -8,7 +8,7 @@ and which feedback never came:
 
 Ticks at which a laboratory was late itself, with those around them, are a matter of scheduling and are not counted. A
 message number that is never used shows a loss only where no message overtakes another, that is in virtual time when all
-take equally long. Without time stamps only the ages are left (see `link_ages`).
+take equally long. Without time stamps only the ages are left (see `ages`).
 """
 
 from __future__ import annotations
