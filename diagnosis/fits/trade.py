@@ -169,6 +169,9 @@ def parted(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:
         usual = fit.data.catalogue[name].under(0, values)
         plain = fitting.fit(fit.data, fit.values | {name: usual}, fit.z)
         others = candidates.extended(plain, scales, count=TRIED, known=fit)[:1]
+        if any(item.cost < fit.cost - TIED for item in others):  # the fit may not have reached its own end
+            fit = fitting.fit(fit.data, fit.values, fit.z)
+            result.append(fit)
         result += [item for item in others if tied(fit, item) or worth.is_worth(bare, fit, item)]
     return result
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from diagnosis.findings.which import described
+from diagnosis.fits import candidates, fitting
 from diagnosis.fits.fitting import TIED, Fit
 from diagnosis.fits.laws import best
-from diagnosis.fits.trade import foremost, simplest, tied
+from diagnosis.fits.trade import foremost, parted, simplest, tied
 from laboratories.effects import CATALOGUE
 from models.registry import Array
 from tests.diagnosis.test_equivalents import DATA, NOISY
@@ -50,6 +52,18 @@ def test_fits_with_equal_costs_and_different_residuals_are_not_tied() -> None:
 def test_a_description_is_written_with_its_laws() -> None:
     assert described(fit(SIDED)) == "damper.friction (law by direction and speed)"
     assert described(fit(PAIR)) == "damper.friction with sensor.column_force.bias"
+
+
+def test_a_fit_that_has_not_reached_its_end_is_moved_on_before_two_effects_are_held_against_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    far, ended, two = fit(SIDED, 0.5), fit(SIDED), fit(PAIR, 1e-4)
+    monkeypatch.setattr(
+        fitting, "fit", lambda _, values, __: ended if "asymmetry" in values["damper.friction"] else far
+    )
+    monkeypatch.setattr(candidates, "extended", lambda *_, **__: [two])
+    assert parted(far, far, None) == [ended, two]  # type: ignore[arg-type]
+    assert parted(far, ended, None) == [two]  # type: ignore[arg-type]
 
 
 def test_another_law_with_as_many_parameters_must_fit_better_and_one_with_more_much_better() -> None:
