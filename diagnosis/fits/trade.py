@@ -15,6 +15,7 @@ import numpy as np
 from diagnosis.fits import candidates, fitting, worth
 from diagnosis.fits.fitting import TIED, Fit, excess
 from diagnosis.fits.hypothesis import Problem, left_out
+from diagnosis.fits.laws.afresh import afresh
 from diagnosis.fits.laws.best import descended, raced
 from diagnosis.fits.laws.loop import of_one_loop, single
 from diagnosis.fits.scales import Scales
@@ -93,6 +94,8 @@ def traded(
     `first` are the fits with one effect, best first; no description has more than `most` effects.
     """
     found = [*joined(chosen, scales), *alone(chosen), *under_others(chosen)]
+    if len(chosen.names) == 1 and worth.is_gap(chosen) and not chosen.data.part.exact:
+        found += afresh(chosen, scales)
     if len(chosen.names) < most:
         found += parted(bare, chosen, scales)
         found += paired(bare, chosen, first, scales)

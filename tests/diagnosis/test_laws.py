@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from common.roles import MASTER
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.laws.afresh import afresh
 from diagnosis.fits.laws.best import in_best_laws
 from diagnosis.fits.laws.specimen import follow, path
 from diagnosis.fits.laws.starts import gridded
@@ -78,7 +81,6 @@ def test_a_model_that_takes_long_is_fitted_where_others_leave_much(monkeypatch: 
     assert follow(part, way, left).keys() == {"clough"}
 
 
-@pytest.mark.slow
 def test_reinforced_concrete_is_found_by_its_layers() -> None:
     part = Driven()
     true = {"axial": 0.5, "concrete": 4.0, "spalling": 0.1, "hardening": -0.01}
@@ -198,6 +200,30 @@ def test_a_law_behind_the_first_starts_on_the_side_that_promises() -> None:
     assert best.effect.laws[int(best.values["law"])].name == "with a bend"
     assert best.values["share"] < 0.0
     assert fitting.at(bare.data, {best.effect.name: best.values}, bare.z).cost < bare.cost
+
+
+class Stiffening(Cracked):
+    """A column alone with cracks that close within a tenth of its motion, and that is stiffer beyond."""
+
+    TRUE: ClassVar = {"factor": 0.15, "hardening": 0.25, "width": 0.00025}
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.candidates = (CATALOGUE["column.hardening"], CATALOGUE["column.pinching"])
+        bell = np.exp(-np.square(self.inputs / self.TRUE["width"]))
+        share = 1.0 - self.TRUE["factor"] * bell + self.TRUE["hardening"] * (1.0 - bell)
+        noise = NOISE * np.random.default_rng(4).standard_normal(TICKS)
+        self.measured = (K * self.inputs * share + noise)[:, None]
+
+
+def test_an_effect_that_promised_nothing_takes_the_place_of_one_that_follows_it_closely() -> None:
+    hardening = CATALOGUE["column.hardening"]
+    near = {"share": 0.3, "bend": 2e-4, "second_share": -0.1, "second_bend": 6e-4}
+    chosen = fitting.fit(data_of(Stiffening()), {hardening.name: hardening.under(2, {"share": 0.3}) | near})
+    best = afresh(chosen, Sizes())[0]
+    assert best.names == ("column.pinching",)
+    for name, true in Stiffening.TRUE.items():
+        assert best.values["column.pinching"][name] == pytest.approx(true, rel=0.1)
 
 
 class HardlyRubbing(Cracked):

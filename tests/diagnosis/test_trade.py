@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.which import described
-from diagnosis.fits import candidates, fitting
+from diagnosis.fits import candidates, fitting, trade, worth
 from diagnosis.fits.fitting import TIED, Fit
 from diagnosis.fits.laws import best
 from diagnosis.fits.trade import foremost, parted, simplest, tied
@@ -64,6 +64,18 @@ def test_a_fit_that_has_not_reached_its_end_is_moved_on_before_two_effects_are_h
     monkeypatch.setattr(candidates, "extended", lambda *_, **__: [two])
     assert parted(far, far, None) == [ended, two]  # type: ignore[arg-type]
     assert parted(far, ended, None) == [two]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("strained", "taken"), [(True, True), (False, False)])
+def test_an_effect_that_strains_nominal_parameters_is_held_against_all_others_afresh(
+    monkeypatch: pytest.MonkeyPatch, strained: bool, taken: bool
+) -> None:
+    chosen, other = fit({"damper.friction": COULOMB}, 0.5), fit(SIDED)
+    monkeypatch.setattr(worth, "is_gap", lambda item: strained and item is chosen)
+    monkeypatch.setattr(trade, "afresh", lambda *_: [other])
+    for name in ("parted", "paired", "released"):
+        monkeypatch.setattr(trade, name, lambda *_: [])
+    assert trade.traded(chosen, chosen, [], None, 3)[0] is (other if taken else chosen)  # type: ignore[arg-type]
 
 
 def test_another_law_with_as_many_parameters_must_fit_better_and_one_with_more_much_better() -> None:
