@@ -15,6 +15,7 @@ from common.recording.reader import read
 from common.recording.run import Run
 from diagnosis.report.records import Report
 from laboratories import kinds
+from master.building import BuildingStep
 from simulation import virtual
 
 # Share of the gap that the truth closes. Where it is smaller, nine tenths of the gap are a chance difference of two
@@ -23,9 +24,12 @@ LEAST = 0.1
 NEVER = 100_000  # readings in a row, the most that a plan takes: more than a trial has
 
 
-def silent_run(plan: Plan, reality: Reality, path: Path) -> Run:
-    """The test with the true laboratories and sensors without noise; its recording is written to `path`."""
-    virtual.run(virtual.assemble(without_noise(plan), reality, path), lambda: "")
+def silent_run(plan: Plan, reality: Reality, path: Path, building: BuildingStep | None = None) -> Run:
+    """The test with the true laboratories and sensors without noise; its recording is written to `path`.
+
+    With a `building` the master serves it instead of computing the reality's own.
+    """
+    virtual.run(virtual.assemble(without_noise(plan), reality, path, building=building), lambda: "")
     return read(path)
 
 

@@ -112,11 +112,15 @@ def begin(index: int, seed: int, set_: str, library: Library) -> Beginning:
     """The kind of a case and the names of its effects."""
     lot = (seed, set_, index)
     kind = SETS[set_].kind(lot)
+    names: tuple[str, ...] = ()
     match kind:
         case "catalogue":
-            names: tuple[str, ...] = (of_catalogue(library, *lot, "effect"),)
+            names = (of_catalogue(library, *lot, "effect"),)
         case "formula" if library.formulas:
             names = (lots.chosen(library.formulas, *lot, "effect"),)
+        case "unknown" if SETS[set_].half:
+            those = sorted(library.half(SETS[set_].half), key=lambda name: lots.number(seed, set_, name))
+            names = (those[SETS[set_].turn(lot) % len(those)],) if those else ()
         case "unknown" if library.strangers:
             names = (lots.chosen(library.strangers, *lot, "effect"),)
         case "pair" if len(library.catalogue) > 1:
@@ -128,8 +132,6 @@ def begin(index: int, seed: int, set_: str, library: Library) -> Beginning:
             names = several(library, lot)
         case "material":
             names = (f"opensees.{SETS[set_].material(lot)}",)
-        case _:
-            names = ()
     return Beginning(index, kind, names, lot)
 
 
@@ -176,7 +178,7 @@ def draw_effect(lot: Lot, kind: str, name: str, library: Library, *, own: bool =
     roles = library.roles(name, replaced=kind in REPLACED or own)
     role, alone = lots.chosen(roles, *lot, name, "laboratory") if roles else "", len(roles) > 1
     if kind == "unknown":
-        stranger = library.strangers[name]
+        stranger = library.stranger(name)
         values = {
             key: between(lots.generator(*lot, name, key), *ends) for key, ends in stranger.ranges.items()
         }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from common.errors import InputError
@@ -50,11 +50,22 @@ class Library:
         default_factory=dict
     )  # roles by effect, none for the building's
     rigs: tuple[str, ...] = ()  # roles that a rig of the trial can replace
+    unlisted: Mapping[str, Stranger] = field(default_factory=dict)  # of the sets that have a half of them
 
     @property
     def names(self) -> tuple[str, ...]:
         """All effects."""
-        return (*self.catalogue, *self.strangers)
+        return (*self.catalogue, *self.strangers, *self.unlisted)
+
+    def stranger(self, name: str) -> Stranger:
+        """An effect that is in no catalogue."""
+        return self.strangers.get(name) or self.unlisted[name]
+
+    def half(self, name: str) -> tuple[str, ...]:
+        """The names of one half of `unlisted`."""
+        from validation.blind.labs.unlisted import every
+
+        return tuple(one for one in self.unlisted if every.half(one) == name)
 
     def independent(self) -> tuple[str, ...]:
         """The effects of the catalogue that the independent laboratories know in any formula."""
@@ -101,7 +112,26 @@ def of_plan(plan: Plan, reached: Callable[[], Reached]) -> Library:
     places |= {name: sites.holders(plan, stranger.site) for name, stranger in found.strangers.items()}
     formulas = {name: those for name, those in found.formulas.items() if found.roles(name, replaced=True)}
     strangers = {name: one for name, one in found.strangers.items() if found.roles(name, replaced=True)}
-    return Library(found.catalogue, formulas, strangers, places, found.rigs)
+    unlisted = of_no_catalogue(plan)
+    places |= {name: sites.holders(plan, one.site) for name, one in unlisted.items()}
+    found = Library(found.catalogue, formulas, strangers, places, found.rigs)
+    fit = {
+        name: one
+        for name, one in unlisted.items()
+        if one.site in sites.BUILDING or found.roles(name, replaced=True)
+    }
+    return replace(found, unlisted=fit)
+
+
+def of_no_catalogue(plan: Plan) -> dict[str, Stranger]:
+    """The effects of the sets of no catalogue, those of the building only where a plan's master can have them."""
+    from validation.blind.labs.unlisted import building, every
+
+    return {
+        name: Stranger(every.site(name), one.ranges)
+        for name, one in every.EFFECTS.items()
+        if every.site(name) not in sites.BUILDING or building.fits(plan)
+    }
 
 
 def fitting(plan: Plan, role: str) -> set[str]:

@@ -37,7 +37,11 @@ from validation.blind.size import levels, messages, play, play_building
 SEEN = 6.18  # twice the 99.9 % point of the normal distribution
 FLOOR = 1e-4  # of white noise, in amplitude: where coloured noise fades, two solutions of one model differ by this much
 WIDTH = 1.0  # Hz, to each side of the mains, which hum hides: where the leakage of a line in 30 s has fallen to 1 %
-RANDOM = (".noise", ".missing")  # effects without a waveform of their own: only their energy can be tested
+RANDOM = (
+    ".noise",
+    ".missing",
+    ".clock",
+)  # effects without a waveform of their own: only their energy can be tested
 UNIFORM = math.sqrt(3.0)  # half the width of a uniform distribution over its standard deviation
 Signals = Mapping[str, Array]
 Played = Callable[[Case, tuple[Laid, ...]], Signals]

@@ -17,6 +17,7 @@ from common.recording.reader import read
 from simulation.workers.pool import spread
 from validation.blind.best import gaps, silent_run, without_noise
 from validation.blind.cases.case import Case, levels, reality
+from validation.blind.cases.computed import strange
 from validation.blind.logger.loggers import LOGGERS
 from validation.blind.logger.relogging import relog
 from validation.blind.oracle import separation
@@ -52,7 +53,9 @@ def record(case: Case, folder: Path) -> RecordedCase:
     path = folder / f"{secrets.token_hex(8)}.mcap"
     played = path.with_suffix(".true") if case.logger else path
     try:
-        bench = virtual.assemble(without_noise(plan) if case.logger else plan, reality(case), played)
+        true = reality(case)
+        published = without_noise(plan) if case.logger else plan
+        bench = virtual.assemble(published, true, played, building=strange(true, case.laid))
     except InputError as error:
         raise InputError(f"Case {case.index} ({truth(case)}) cannot be built: {error}") from None
     ended = virtual.run(bench, lambda: "")
@@ -60,13 +63,14 @@ def record(case: Case, folder: Path) -> RecordedCase:
         raise InputError(f"Case {case.index} ({truth(case)}) cannot be recorded: {ended}")
     if case.other:
         play_other(case, path.with_suffix(OTHER))
-    true = path.with_suffix(".true")
+    quiet = path.with_suffix(".true")
     if case.logger:
         relog(played, path, plan, LOGGERS[case.logger], levels(case.truths), case.seed)
-        silent = read(true)
+        silent = read(quiet)
     else:
-        silent = silent_run(plan, reality(case, silent=True), true)
-    true.unlink()
+        noiseless = reality(case, silent=True)
+        silent = silent_run(plan, noiseless, quiet, strange(noiseless, case.laid))
+    quiet.unlink()
     run = read(path)
     seen, left = separation(case, run), gaps(run, silent, plan)
     return RecordedCase(case.index, path.name, sizes(case, path), str(ended or ""), seen, left)
@@ -78,7 +82,8 @@ def play_other(case: Case, path: Path) -> None:
 
     second = replace(case, plan=case.other)
     plan = plans.from_tables(second.plan, Path())
-    virtual.run(virtual.assemble(plan, reality(second), path), lambda: "")
+    true = reality(second)
+    virtual.run(virtual.assemble(plan, true, path, building=strange(true, case.laid)), lambda: "")
 
 
 def truth(case: Case) -> str:

@@ -23,6 +23,10 @@ MILD = 9
 # contain 30 or more, so that a rate of 90 % is known to ±11 points.
 SHARES = {"catalogue": 0.50, "formula": 0.15, "unknown": 0.10, "pair": 0.10, "clean": 0.15}
 
+# Halves of the effects of no catalogue: one to develop on, one to judge on.
+HALVES = ("developed", "judged")
+CLEAN_TURN = 5  # of the cases with such effects every fifth laboratory is clean
+
 
 @dataclass(frozen=True)
 class CaseSet:
@@ -38,11 +42,14 @@ class CaseSet:
     normal: bool = False
     own: bool = False  # every laboratory that has independent code is played by it
     materials: tuple[str, ...] = ()  # OpenSees' materials in the column's place, taken in turn
+    half: str = ""  # of the effects of no catalogue in `labs.unlisted`, which are taken in turn
     # A second motion is recorded, on which the diagnosis judges what it found on the first.
     twice: bool = False
 
     def kind(self, lot: Lot) -> str:
         """The kind of a case."""
+        if self.half:
+            return "clean" if int(lot[-1]) % CLEAN_TURN == CLEAN_TURN - 1 else "unknown"
         if self.turns:
             return self.turns[self._round(lot) % len(self.turns)]
         from validation.blind import lots
@@ -54,6 +61,10 @@ class CaseSet:
     def material(self, lot: Lot) -> str:
         """The material of a case."""
         return self.materials[int(lot[-1]) % len(self.materials)]
+
+    def turn(self, lot: Lot) -> int:
+        """The place of a case among those with an effect of no catalogue."""
+        return int(lot[-1]) - int(lot[-1]) // CLEAN_TURN
 
     def logger(self, lot: Lot) -> str:
         """The logger of a case, empty for none."""
@@ -78,6 +89,10 @@ SETS = {
         {"clean": 0.35, "formula": 0.3, "pair": 0.35},
         own=True,
     ),
+    "unlisted": CaseSet(
+        "effects of no catalogue, for judging only, and clean laboratories", half="judged", own=True
+    ),
+    "unlisted_tune": CaseSet("others of them, to develop on", half="developed", own=True),
     "materials": CaseSet(
         "OpenSees' materials as columns (make opensees)",
         turns=("material",),

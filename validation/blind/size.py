@@ -94,11 +94,12 @@ def of_building(case: Case, item: Laid, run: Run) -> Differences:
 
 def play_building(case: Case, laid: tuple[Laid, ...], run: Run) -> dict[str, Values]:
     """The building's targets for each role's laboratory, and the ground acceleration (no role)."""
-    from master.assembly import master_step
+    from validation.blind.cases.computed import building
 
     plan = plans.from_tables(case.plan, Path())
     kinds, columns = kinds_of(plan), run.columns[MASTER]
-    step, ticks = master_step(reality(case, laid, silent=True)), run.ticks(MASTER)
+    step = building(reality(case, laid, silent=True), laid)
+    ticks = run.ticks(MASTER)
     nothing = np.zeros(ticks)
     felt = [nothing, nothing]
     if MASTER in kinds:

@@ -59,7 +59,7 @@ def test_only_verdicts_that_name_something_are_learned_from_and_partly_ones_apar
     cases = [
         case(),
         case(signs={}),
-        case(kind="unknown"),
+        case(kind="unknown", listed=0),
         case("partly_explained", listed=0),
         case(probability=None),
         case(surplus=1),

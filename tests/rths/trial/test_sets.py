@@ -172,5 +172,15 @@ def test_the_oracle_sees_less_through_a_logger_that_adds_noise_at_the_signals_fr
 
 def test_every_set_states_its_question() -> None:
     assert all(chosen.text for chosen in SETS.values())
-    assert set(SETS) == {"judge", "tune", "loggers", "normal", "many", "independent", "materials"}
+    assert set(SETS) == {
+        "judge",
+        "tune",
+        "loggers",
+        "normal",
+        "many",
+        "independent",
+        "unlisted",
+        "unlisted_tune",
+        "materials",
+    }
     assert len(LOGGERS) == 15

@@ -57,7 +57,9 @@ class Case:
         for role in replaced:
             own = [item for item in laid if item.role == role]
             tables = with_rig(tables, role, self._rig(tables, role, own))
-        effects = [written(item) for item in laid if item.role not in replaced]
+        effects = [
+            written(item) for item in laid if item.role not in replaced and not strange_building([item])
+        ]
         return {"seed": self.seed, **tables, **({"effect": effects} if effects else {})}
 
     def replaced(self) -> tuple[str, ...]:
@@ -79,6 +81,11 @@ class Case:
         ]
         rig = rig_of(kind, options)
         return rig | {"class": MATERIAL_LAB} if self.kind == MATERIAL else rig
+
+
+def strange_building(laid: Sequence[Laid]) -> Laid | None:
+    """The effect of no catalogue that the building has, none where it is the plan's."""
+    return next((item for item in laid if not item.role and item.name.startswith("x.")), None)
 
 
 def written(item: Laid) -> dict[str, Any]:

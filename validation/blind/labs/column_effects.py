@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from validation.blind.labs.laying import PLAIN, KnownEffect, Values
 from validation.blind.labs.parts import delay, friction, specimen, valve, yielding
+from validation.blind.labs.unlisted import actuator, column, effect
 
 
 def servo_delay(values: Values, *, delay: float) -> None:
@@ -157,4 +158,6 @@ KNOWN = {
     "x.actuator.droop": KnownEffect(droop, PLAIN),
     "x.actuator.valve_hysteresis": KnownEffect(valve_hysteresis, PLAIN),
     "x.column.asymmetry": KnownEffect(asymmetry, PLAIN),
+    **effect.known(actuator.EFFECTS),
+    **effect.known(column.EFFECTS),
 }

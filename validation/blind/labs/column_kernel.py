@@ -11,6 +11,9 @@ from typing import NamedTuple
 from validation.blind.labs.parts import delay, filters, specimen, valve
 from validation.blind.labs.parts.compiled import Array, jit
 from validation.blind.labs.parts.specimen import TrueSpecimen
+from validation.blind.labs.unlisted import actuator as unlisted_actuator
+from validation.blind.labs.unlisted import column as unlisted_column
+from validation.blind.labs.unlisted.effect import Held
 
 CONTACT = 1e4  # stiffness of the clevis over the specimen's: it takes 0.01 % of the motion, less than the sensor sees
 GREASE = 5e-3  # s, dashpot of the clevis over the specimen's stiffness: the specimen returns through the gap in 5 ms
@@ -38,6 +41,7 @@ class Servo(NamedTuple):
     droop: float = 0.0  # share of the flow gain
     ripple: float = 0.0  # m
     ripple_frequency: float = 10.0  # Hz
+    unlisted: float = 0.0  # code of an effect of no catalogue, of the actuator or the column
 
 
 class ColumnMemory(NamedTuple):
@@ -48,34 +52,40 @@ class ColumnMemory(NamedTuple):
     approximation: Array  # of a dead time that is approximated
     specimen: Array
     filtered: Array  # of the readings
+    unlisted: Held
 
 
 @jit
-def velocity(p: Servo, stiffness: float, state: Array, wanted: float, piston: float, time: float) -> float:
+def velocity(
+    p: Servo, stiffness: float, state: Array, added: Array, wanted: float, piston: float, time: float
+) -> float:
     """Velocity (m/s) of the piston at `piston` m under the command `wanted` m.
 
     The load follows the specimen's first stiffness within a step. It takes the place of an error of the
     loop where the oil column yields: `T·ẏ = K·u − y − c·f` (Merritt, Hydraulic Control Systems, Wiley 1967).
     """
     load = state[FORCE] + stiffness * (piston - state[PISTON])
-    error = p.gain * wanted - piston - p.compliance * load
+    error = p.gain * wanted + added[unlisted_actuator.DEMAND] - piston - p.compliance * load
     error = valve.spool(state[SPOOL], error, p.hysteresis)
     free = valve.overlap(error, p.deadband) / p.time_constant
     free *= valve.supplied(p.droop, state[USED])
     if p.ripple != 0.0:
         omega = 2.0 * math.pi * p.ripple_frequency
         free += p.ripple * omega * math.cos(omega * time)
+    free += added[unlisted_actuator.SPEED] * free + added[unlisted_actuator.FLOW]
     return valve.flow(p.limiting, free, p.velocity_limit, load)
 
 
 @jit
-def drive(p: Servo, stiffness: float, state: Array, early: float, middle: float, late: float) -> float:
+def drive(
+    p: Servo, stiffness: float, state: Array, added: Array, early: float, middle: float, late: float
+) -> float:
     """Place of the piston (m) one step later under a command at its beginning, middle and end."""
     h, y, t = p.step, state[PISTON], state[TIME]
-    a = velocity(p, stiffness, state, early, y, t)
-    b = velocity(p, stiffness, state, middle, y + 0.5 * h * a, t + 0.5 * h)
-    c = velocity(p, stiffness, state, middle, y + 0.5 * h * b, t + 0.5 * h)
-    d = velocity(p, stiffness, state, late, y + h * c, t + h)
+    a = velocity(p, stiffness, state, added, early, y, t)
+    b = velocity(p, stiffness, state, added, middle, y + 0.5 * h * a, t + 0.5 * h)
+    c = velocity(p, stiffness, state, added, middle, y + 0.5 * h * b, t + 0.5 * h)
+    d = velocity(p, stiffness, state, added, late, y + h * c, t + h)
     moved = h * (a + 2.0 * b + 2.0 * c + d) / 6.0
     error = p.gain * late - (y + moved) - p.compliance * (state[FORCE] + stiffness * moved)
     state[SPOOL] = valve.spool(state[SPOOL], error, p.hysteresis)
@@ -106,6 +116,27 @@ def clevis(p: Servo, stiffness: float, state: Array, piston: float) -> float:
 
 
 @jit
+def look(
+    p: Servo, column: TrueSpecimen, state: Array, held: Held, wanted: float, piston: float, place: float
+) -> None:
+    """Let the effect of no catalogue see the end of a step at `piston` and deformation `place`, both m."""
+    seen, h = held.seen, p.step
+    rate = (place - state[DEFORMATION]) / h
+    seen[unlisted_actuator.TIME] = state[TIME]
+    seen[unlisted_actuator.STEP] = h
+    seen[unlisted_actuator.PISTON] = piston
+    seen[unlisted_actuator.PISTON_RATE] = (piston - state[PISTON]) / h
+    seen[unlisted_actuator.ERROR] = p.gain * wanted - piston
+    seen[unlisted_actuator.ACCELERATION] = (rate - seen[unlisted_actuator.RATE]) / h
+    seen[unlisted_actuator.RATE] = rate
+    seen[unlisted_actuator.PLACE] = place
+    seen[unlisted_actuator.FORCE] = state[FORCE]
+    seen[unlisted_actuator.STIFFNESS] = column.stiffness
+    unlisted_actuator.hold(p.unlisted, held.sizes, held.kept, seen, held.added)
+    unlisted_column.hold(p.unlisted, held.sizes, held.kept, seen, held.added)
+
+
+@jit
 def advance(
     p: Servo,
     column: TrueSpecimen,
@@ -115,6 +146,7 @@ def advance(
 ) -> tuple[float, float]:
     """Displacement (m) and force (N) behind their filters one interval later, the command ramped."""
     state, past, approximation, filtered = memory.state, memory.past, memory.approximation, memory.filtered
+    held, added = memory.unlisted, memory.unlisted.added
     start = state[COMMAND]
     back = p.delay / p.step
     displacement, force = 0.0, 0.0
@@ -129,9 +161,14 @@ def advance(
         if p.pade > 0.0:
             late = delay.pade(approximation, p.pade, late, p.step)
             middle = 0.5 * (early + late)
-        piston = drive(p, column.stiffness, state, early, middle, late)
+        piston = drive(p, column.stiffness, state, added, early, middle, late)
         deformation = clevis(p, column.stiffness, state, piston) if p.backlash > 0.0 else piston
+        deformation += added[unlisted_actuator.SHIFT]
         state[FORCE], state[READING] = specimen.force(column, memory.specimen, deformation, p.step)
+        state[FORCE] += added[unlisted_actuator.LOAD]
+        state[READING] += added[unlisted_actuator.LOAD]
+        if p.unlisted > 0.0:
+            look(p, column, state, held, late, piston, deformation)
         state[PISTON], state[DEFORMATION] = piston, deformation
         displacement = filters.step_filter(lags[0], filtered[0], deformation, p.step)
         force = filters.step_filter(lags[1], filtered[1], state[READING], p.step)

@@ -18,6 +18,8 @@ from validation.blind.labs.column_effects import KNOWN
 from validation.blind.labs.column_kernel import ColumnMemory, Servo
 from validation.blind.labs.parts import delay, filters, specimen
 from validation.blind.labs.parts.specimen import TrueSpecimen
+from validation.blind.labs.unlisted import actuator as actuator_effects
+from validation.blind.labs.unlisted.effect import held
 
 STEP = 0.1e-3  # s, longest: a loop of 30 Hz, faster than any here, turns by 0.02 rad in it
 SIGNALS = ColumnMeasurement._fields
@@ -53,6 +55,7 @@ class TrueColumnLab:
             np.zeros(3),
             np.zeros(specimen.SIZE),
             np.zeros((len(SIGNALS), 3)),
+            held(values, actuator_effects.SEEN, actuator_effects.ADDED),
         )
         self._true: tuple[float, ...] = (0.0, 0.0)
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from validation.blind.labs.laying import PLAIN, KnownEffect, Values
+from validation.blind.labs.unlisted import readings
 
 BLOCK = 512  # rows of noise drawn at once, because one call costs as much as a hundred draws
 LAGS = {"butterworth": 2, "first_order": 1}
@@ -96,7 +97,7 @@ def known(names: Sequence[str]) -> dict[str, KnownEffect]:
         result[f"sensor.{name}.saturation"] = blunt
         for effect in OUTSIDE:
             result[f"x.sensor.{name}.{effect.__name__}"] = KnownEffect(partial(effect, signal=name), PLAIN)
-    return result
+    return result | readings.of_signals(names)
 
 
 def blunted(value: float, limit: float, sharpness: float) -> float:
@@ -134,6 +135,7 @@ class TrueSensors:
     def __init__(self, names: Sequence[str], values: Values, interval: float, seed: int) -> None:
         own = [{key: values[f"{name}.{key}"] for key in keys(name, values)} for name in names]
         self._sensors = [TrueSensor(v, np.random.default_rng([seed, 1 + i])) for i, v in enumerate(own)]
+        self._strange = readings.strange(names, values, interval, seed)
         self._changed = any(v != {**perfect(), "noise": v["noise"]} for v in own)
         self._levels = np.array([v["noise"] for v in own])
         self._noise = np.random.default_rng(seed)
@@ -149,6 +151,11 @@ class TrueSensors:
         errors = self._block.pop()
         t = self._tick * self._interval
         self._tick += 1
+        if self._strange:
+            true = [
+                self._strange[place].read(true, t) if place in self._strange else value
+                for place, value in enumerate(true)
+            ]
         if not self._changed:
             return [value + error for value, error in zip(true, errors, strict=True)]
         pairs = zip(self._sensors, true, errors, strict=True)

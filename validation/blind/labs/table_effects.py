@@ -7,6 +7,7 @@ import math
 from validation.blind.labs.column_effects import lengthen
 from validation.blind.labs.laying import PLAIN, KnownEffect, Values
 from validation.blind.labs.parts import friction, mechanics
+from validation.blind.labs.unlisted import damper, effect, table
 
 
 def table_delay(values: Values, *, delay: float) -> None:
@@ -151,4 +152,6 @@ KNOWN = {
     "x.damper.cable_drag": KnownEffect(cable_drag, PLAIN),
     "x.damper.motor_constant": KnownEffect(motor_constant, PLAIN),
     "x.damper.cubic_spring": KnownEffect(cubic_spring, PLAIN),
+    **effect.known(table.EFFECTS),
+    **effect.known(damper.EFFECTS),
 }

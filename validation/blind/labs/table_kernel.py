@@ -10,6 +10,9 @@ from typing import NamedTuple
 
 from validation.blind.labs.parts import delay, filters, friction, mechanics
 from validation.blind.labs.parts.compiled import Array, jit
+from validation.blind.labs.unlisted import damper as unlisted_damper
+from validation.blind.labs.unlisted import table as unlisted_table
+from validation.blind.labs.unlisted.effect import Held
 
 # m/s; the mass moves at up to some 0.5 m/s, so that friction is Coulomb's but near a reversal.
 RUBBING = 1e-3  # scale of the regularised friction, of rail and table
@@ -37,6 +40,7 @@ class TableMemory(NamedTuple):
     approximation: Array  # of a dead time that is approximated
     work: Array  # (6, MOVING): rates, and room for the readings
     filtered: Array  # of the readings
+    unlisted: Held
 
 
 class TrueTable(NamedTuple):
@@ -75,6 +79,7 @@ class TrueTable(NamedTuple):
     appendage: float = 0.0  # kg
     appendage_omega: float = 10.0  # rad/s
     appendage_damping: float = 0.1  # ratio
+    unlisted: float = 0.0  # code of an effect of no catalogue, of the table or the damper
 
 
 @jit
@@ -96,13 +101,14 @@ def asked(p: TrueTable, command: float) -> float:
 
 
 @jit
-def damper_force(p: TrueTable, x: Array, push: float, start: float, bristle: float) -> float:
+def damper_force(p: TrueTable, x: Array, added: Array, push: float, start: float, bristle: float) -> float:
     """Force (N) on the table at a state; `start` is the stroke to which the bristles' deflection belongs."""
     motor = x[MOTOR] if p.motor_lag > 0.0 else push
     motor *= mechanics.motor_constant(p.motor_rise, x[STROKE])
+    motor += added[unlisted_table.MOTOR]
     if p.friction > 0.0:
         bristle = bent(p, bristle, x[STROKE] - start, x[STROKE_RATE])
-    return float(rail(p, x, bristle) - motor)
+    return float(rail(p, x, bristle) + added[unlisted_table.RAIL] - motor)
 
 
 @jit
@@ -123,13 +129,22 @@ def platform(p: TrueTable, x: Array, loop: float) -> float:
 
 @jit
 def rates(
-    p: TrueTable, x: Array, dx: Array, wanted: float, push: float, start: float, bristle: float
+    p: TrueTable,
+    x: Array,
+    dx: Array,
+    added: Array,
+    wanted: float,
+    push: float,
+    start: float,
+    bristle: float,
 ) -> None:
     """Rates `dx` of the state under a table command (m) and the force asked of the motor (N)."""
-    force = damper_force(p, x, push, start, bristle)
+    force = damper_force(p, x, added, push, start, bristle)
+    wanted += added[unlisted_table.DEMAND]
     loop = p.omega**2 * (wanted + p.compliance * force - x[LOOP]) - 2.0 * p.damping * p.omega * x[LOOP_RATE]
     if p.table_friction > 0.0:
         loop -= p.table_friction * friction.regularised(x[LOOP_RATE], RUBBING)
+    loop += added[unlisted_table.KICK]
     plate = platform(p, x, loop)
     loose = p.appendage_omega**2 * x[LOOSE]
     loose += 2.0 * p.appendage_damping * p.appendage_omega * x[LOOSE_RATE]
@@ -147,20 +162,27 @@ def rates(
 
 @jit
 def move(
-    p: TrueTable, state: Array, work: Array, early: float, middle: float, late: float, push: float
+    p: TrueTable,
+    state: Array,
+    work: Array,
+    added: Array,
+    early: float,
+    middle: float,
+    late: float,
+    push: float,
 ) -> None:
     """One step of the state under a table command at its beginning, middle and end."""
     h, start, bristle = p.step, state[STROKE], state[BRISTLE]
-    rates(p, state, work[0], early, push, start, bristle)
+    rates(p, state, work[0], added, early, push, start, bristle)
     for i in range(MOVING):
         work[4, i] = state[i] + 0.5 * h * work[0, i]
-    rates(p, work[4], work[1], middle, push, start, bristle)
+    rates(p, work[4], work[1], added, middle, push, start, bristle)
     for i in range(MOVING):
         work[4, i] = state[i] + 0.5 * h * work[1, i]
-    rates(p, work[4], work[2], middle, push, start, bristle)
+    rates(p, work[4], work[2], added, middle, push, start, bristle)
     for i in range(MOVING):
         work[4, i] = state[i] + h * work[2, i]
-    rates(p, work[4], work[3], late, push, start, bristle)
+    rates(p, work[4], work[3], added, late, push, start, bristle)
     for i in range(MOVING):
         state[i] += h * (work[0, i] + 2.0 * work[1, i] + 2.0 * work[2, i] + work[3, i]) / 6.0
     if p.friction > 0.0:
@@ -168,13 +190,35 @@ def move(
 
 
 @jit
-def observe(p: TrueTable, state: Array, work: Array, out: Array, wanted: float, push: float) -> None:
+def observe(
+    p: TrueTable, state: Array, work: Array, added: Array, out: Array, wanted: float, push: float
+) -> None:
     """Write the true values at the sensors into `out`."""
-    rates(p, state, work[0], wanted, push, state[STROKE], state[BRISTLE])
+    rates(p, state, work[0], added, wanted, push, state[STROKE], state[BRISTLE])
     out[DISPLACEMENT] = state[PLATE]
     out[ACCELERATION] = work[0, PLATE_RATE] + work[0, PITCH_RATE]
     out[STROKE_OUT] = state[STROKE]
-    out[FORCE] = damper_force(p, state, push, state[STROKE], state[BRISTLE])
+    out[FORCE] = damper_force(p, state, added, push, state[STROKE], state[BRISTLE])
+
+
+@jit
+def look(p: TrueTable, state: Array, rate: Array, held: Held, wanted: float, push: float) -> None:
+    """Let the effect of no catalogue see the state and its `rate` at the end of a step."""
+    seen = held.seen
+    seen[unlisted_table.TIME] += p.step
+    seen[unlisted_table.STEP] = p.step
+    seen[unlisted_table.WANTED] = wanted
+    seen[unlisted_table.PLACE] = state[PLATE]
+    seen[unlisted_table.RATE] = state[PLATE_RATE]
+    seen[unlisted_table.SPRING] = p.omega**2
+    seen[unlisted_table.DASHPOT] = 2.0 * p.damping * p.omega
+    seen[unlisted_table.ACCELERATION] = rate[PLATE_RATE]
+    seen[unlisted_table.STROKE] = state[STROKE]
+    seen[unlisted_table.STROKE_RATE] = state[STROKE_RATE]
+    seen[unlisted_table.STROKE_ACC] = rate[STROKE_RATE]
+    seen[unlisted_table.PUSH] = state[MOTOR] if p.motor_lag > 0.0 else push
+    unlisted_table.hold(p.unlisted, held.sizes, held.kept, seen, held.added)
+    unlisted_damper.hold(p.unlisted, held.sizes, held.kept, seen, held.added)
 
 
 @jit
@@ -197,7 +241,7 @@ def advance(
     The table's command is ramped, the motor's is held.
     """
     state, past, approximation = memory.state, memory.past, memory.approximation
-    work, filtered = memory.work, memory.filtered
+    work, filtered, added = memory.work, memory.filtered, memory.unlisted.added
     begun, back, steps = state[COMMAND], p.delay / p.step, int(p.steps)
     push = asked(p, motor_command)
     out = work[5]
@@ -211,8 +255,10 @@ def advance(
             raw = delay.pade(approximation, p.pade, raw, p.step)
             middle = 0.5 * (before + raw)
         late = told(p, raw)
-        move(p, state, work, early, told(p, middle), late, push)
-        observe(p, state, work, out, late, push)
+        move(p, state, work, added, early, told(p, middle), late, push)
+        observe(p, state, work, added, out, late, push)
+        if p.unlisted > 0.0:
+            look(p, state, work[0], memory.unlisted, late, push)
         for k in range(4):
             out[k] = filters.step_filter(lags[k], filtered[k], out[k], p.step)
     state[COMMAND] = command

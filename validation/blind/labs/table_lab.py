@@ -18,6 +18,8 @@ from validation.blind.labs.column_lab import STEP, readings
 from validation.blind.labs.parts import delay
 from validation.blind.labs.table_effects import KNOWN
 from validation.blind.labs.table_kernel import TableMemory, TrueTable
+from validation.blind.labs.unlisted import table as table_effects
+from validation.blind.labs.unlisted.effect import held
 
 SIGNALS = TableMeasurement._fields
 
@@ -51,6 +53,7 @@ class TrueTableLab:
             np.zeros(3),
             np.zeros((6, table_kernel.MOVING)),
             np.zeros((len(SIGNALS), 3)),
+            held(values, table_effects.SEEN, table_effects.ADDED),
         )
         self._true: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 

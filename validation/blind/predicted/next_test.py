@@ -18,6 +18,7 @@ from models.registry import Array
 from validation.blind import lots
 from validation.blind.cases.basis import TrialBasis, log_uniform
 from validation.blind.cases.case import Case, levels, reality
+from validation.blind.cases.computed import strange
 from validation.blind.logger.loggers import LOGGERS
 from validation.blind.logger.relogging import relog
 from validation.blind.oracle import RANDOM
@@ -120,7 +121,8 @@ def driven(case: Case, path: Path, *, without_noise: bool) -> str:
 
     laid = tuple(item for item in case.laid if not (without_noise and item.name.endswith(RANDOM)))
     plan = plans.from_tables(case.plan, Path())
-    ended = virtual.run(virtual.assemble(plan, reality(case, laid, silent=without_noise), path), lambda: "")
+    true = reality(case, laid, silent=without_noise)
+    ended = virtual.run(virtual.assemble(plan, true, path, building=strange(true, laid)), lambda: "")
     if ended is not None and not isinstance(ended, InterlockError):
         raise InputError(f"The next test of case {case.index} cannot be recorded: {ended}")
     return str(ended or "")

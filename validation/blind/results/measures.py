@@ -16,7 +16,7 @@ from validation.blind.library import OWN_KERNEL
 from validation.blind.results.calibration import clopper_pearson, expected_calibration_error, wilson
 from validation.blind.results.calibration import reliability as stated_and_observed
 from validation.blind.results.rows import case_rows
-from validation.blind.results.scoring import JudgedEstimate, Outcome
+from validation.blind.results.scoring import SURE, JudgedEstimate, Outcome
 from validation.blind.results.stated import brier_score, in_columns, stated_verdicts
 
 Judged = TypeVar("Judged")
@@ -182,6 +182,9 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
     return [
         rate("visible unknown effect: reported, site right", strange, lambda item: item.right),
         rate("unknown effect that an oracle sees: reported, site right", noticed, lambda item: item.right),
+        rate(
+            "… a wrong name that is sure", noticed, lambda item: item.surplus > 0 and item.probability >= SURE
+        ),
         rate("both of a pair whose strongest is visible", pairs, lambda item: item.named),
         *closed_on_another_motion(outcomes),
         rate("an oracle sees an effect", gaps, lambda item: item.seen),

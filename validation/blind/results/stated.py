@@ -16,7 +16,8 @@ Stated = tuple[float, bool]  # probability, and whether it was true
 
 def is_true(kind: str, truth: Sized, asked: int, listed: int, surplus: int) -> bool:
     """Whether a verdict is true: it names every effect that is large enough to be found, and none that is not there."""
-    return len(truth) > 0 and kind != "unknown" and listed == asked and surplus == 0
+    known = kind != "unknown" or listed > 0  # an unknown effect has no name but that of its mechanism
+    return len(truth) > 0 and known and listed == asked and surplus == 0
 
 
 def stated_verdicts(outcomes: Iterable[Outcome]) -> list[Stated]:
