@@ -28,7 +28,7 @@ from validation.blind.draw import begin, draw
 from validation.blind.judge import DiagnosisAnswer
 from validation.blind.labs.device_lab import OwnKernelLab
 from validation.blind.library import OWN_KERNEL
-from validation.blind.oracle import neighbours
+from validation.blind.oracle import tolerated
 from validation.blind.record import RecordedCase, record
 from validation.blind.results.scoring import Outcome, judge
 
@@ -78,7 +78,7 @@ def test_true_parameters_of_two_columns_are_drawn_independently() -> None:
 def test_the_oracle_varies_the_parameters_of_the_laboratory_that_it_judges(name: str) -> None:
     (case,) = draw(1, 1, "judge", trial=trial_of(name), only=["clean"])
     for role, kind in trial_of(name).plan.kinds.items():
-        assert len(neighbours(case, role)) == {"column": 4, "table": 7}[kind]
+        assert len(tolerated(case, role)) == {"column": 4, "table": 7}[kind]
 
 
 def test_cases_of_a_users_kind_are_drawn_from_its_own_effects_and_tolerances() -> None:

@@ -14,6 +14,7 @@ import pytest
 
 from common.plan import read as plans
 from common.reality import reality as realities
+from common.roles import MASTER
 from diagnosis.report import read as read_report
 from tests import opensees
 from tests.rths.diagnosis_report.pieces import bare
@@ -168,6 +169,17 @@ def test_the_oracle_sees_less_through_a_logger_that_adds_noise_at_the_signals_fr
     assert oracle.amplitude(Logger("", printed=True), 0.0, "N", np.asarray(t), 0.002)[0] == pytest.approx(
         math.sqrt(1 / 12)
     )
+
+
+def test_the_oracle_holds_an_effect_against_the_nearest_laboratory_without_it() -> None:
+    """One parameter that is 20 % off does what the effect does, and no less than that does it."""
+    (clean,) = drawn("judge", 1, "clean")
+    true = clean.truths["column"]["stiffness"]
+
+    def apart(other: Case) -> np.ndarray[Any, Any]:
+        return np.array([1e5 * (math.exp(4.0 * other.truths["column"]["stiffness"] / true) - math.exp(4.8))])
+
+    assert oracle.nearest(clean, MASTER, apart) == pytest.approx(0.2 / (0.02 / math.sqrt(3.0)), rel=0.01)
 
 
 def test_every_set_states_its_question() -> None:
