@@ -28,7 +28,7 @@ class Ground(Measured):
         self._interval = record.plan.test.interval
         stated = record.stated or ImportedData("")
         rows = stated.channel(MASTER, self.signals[0])
-        self._believed = rows.through(believed[0, : record.ticks], self._interval)
+        self._believed = rows.through(believed[0], self._interval)  # beyond the test's end as well
         self._scale = record.plan.ground_motion.scale
         self.measured = record.signals["ground_acceleration"][:, None]
         self.present = record.present["ground_acceleration"][:, None]
@@ -47,7 +47,7 @@ class Ground(Measured):
         """Ground acceleration."""
         factor = system.plan.ground_motion.scale / self._scale if self._scale else 1.0
         shift = system.effects.time_shift / self._interval
-        return factor * substructure.shifted(self._believed[None], shift).T
+        return factor * substructure.shifted(self._believed[None], shift).T[: len(self.measured)]
 
     def first(self, ticks: int) -> Ground:
         """The whole of it, because it is computed and cheap."""

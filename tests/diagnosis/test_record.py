@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,9 +13,11 @@ from numpy.typing import NDArray
 from common.errors import InputError
 from common.recording.reader import read
 from common.recording.run import GROUND, Run
+from common.roles import MASTER
 from diagnosis.diagnose import not_recorded
 from diagnosis.recorded import record
 from diagnosis.recorded.divided import parts_of
+from diagnosis.recorded.ground import Ground
 from tests.diagnosis.cases import Cases, short
 
 
@@ -34,6 +38,16 @@ def kept(run: Run, topic: str, rows: NDArray[np.int64]) -> Run:
     run.columns[topic] = {name: values[rows] for name, values in run.columns[topic].items()}
     run.sequences[topic] = run.sequences[topic][rows]
     return run
+
+
+def test_a_shifted_ground_motion_is_known_up_to_the_end_of_the_test(cases: Cases) -> None:
+    shift = -0.02
+    whole = cases.record({"ground.time_shift": {"shift": shift}}, duration=4.0)
+    assert whole.ground is not None
+    system = whole.systems[MASTER]
+    later = replace(system, effects=replace(system.effects, time_shift=shift))
+    part = Ground(whole, whole.ground)
+    np.testing.assert_allclose(part.predict(later), part.measured, atol=1e-12)
 
 
 @given(
