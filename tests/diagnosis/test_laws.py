@@ -220,7 +220,17 @@ def test_an_effect_that_promised_nothing_takes_the_place_of_one_that_follows_it_
     hardening = CATALOGUE["column.hardening"]
     near = {"share": 0.3, "bend": 2e-4, "second_share": -0.1, "second_bend": 6e-4}
     chosen = fitting.fit(data_of(Stiffening()), {hardening.name: hardening.under(2, {"share": 0.3}) | near})
-    best = afresh(chosen, Sizes())[0]
+    assert_pinching(afresh(chosen, Sizes())[0])
+
+
+def test_a_shape_that_did_nothing_where_a_fit_began_is_found_from_elsewhere() -> None:
+    without = {name: value for name, value in Stiffening.TRUE.items() if name != "hardening"}
+    chosen = fitting.fit(data_of(Stiffening()), {"column.pinching": {**without, "hardening": 0.0}})
+    assert chosen.values["column.pinching"]["hardening"] == 0.0
+    assert_pinching(afresh(chosen, Sizes())[0])
+
+
+def assert_pinching(best: Fit) -> None:
     assert best.names == ("column.pinching",)
     for name, true in Stiffening.TRUE.items():
         assert best.values["column.pinching"][name] == pytest.approx(true, rel=0.1)

@@ -1,7 +1,8 @@
 """Effects under all their laws from a grid of sizes and shapes, in the place of one that does not explain enough.
 
 A search begins where effects look like straight lines of their size. One that bends where a motion is small may promise
-nothing there, and one with more shapes follows it closely while nominal parameters make up for the rest.
+nothing there, and one with more shapes follows it closely while nominal parameters make up for the rest. Nor does a fit
+of the right effect find a shape that does nothing where it begins.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ from diagnosis.fits.threads import each
 
 
 def afresh(fit: Fit, scales: Scales) -> list[Fit]:
-    """Fits with another effect in the place of the only one, of which the costs are clearly lower, best first."""
+    """Fits with one effect, another or the same from elsewhere, of clearly lower costs, best first."""
     bare = fitting.at(fit.data, {}, fit.z)
     starts = [
         [{effect.name: values} for values in gridded(bare, effect, place, scales)]
         for effect in fit.data.part.candidates
         for place, law in enumerate(effect.laws)
-        if not law.model and effect.name not in fit.names
+        if not law.model
     ]
     begun = [fitted(cheapest(bare, grid), ROUGH, 1) for grid in starts if grid]
     leading = each(lambda item: fitted(item, STEPS, ROUNDS), sorted(begun, key=cost)[:LEADING])
