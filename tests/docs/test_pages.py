@@ -60,6 +60,7 @@ UNRUN = {
         "rths slave two_dampers --name middle --connect tcp/192.0.2.1:7447",
     ],
     "docs/reference/blind.md": [
+        "rths blind --set unlisted_tune --seed 1 --cases 35 --duration 12",
         "rths blind --predict --cases 24 --seed 21 --only catalogue,formula,unknown --duration 20",
         "rths blind --predict --set materials --cases 8 --seed 3 --duration 20",
         "rths blind --set loggers --cases 90 --seed 17 -o runs/loggers",
@@ -110,6 +111,9 @@ UNRUN = {
         "rths blind --set loggers --seed 9111 --cases 45 --duration 12",
         "rths blind --set loggers --seed 9222 --cases 30 --duration 12 --only catalogue",
         "rths blind --set loggers --seed 9333 --cases 30 --duration 12 --only catalogue",
+        "rths blind --set loggers --seed 9111 --cases 60 --duration 12 --only catalogue",
+        "rths blind --set loggers --seed 9222 --cases 60 --duration 12 --only catalogue",
+        "rths blind --set loggers --seed 9444 --cases 60 --duration 12",
         "rths blind --set judge --seed 8101 --only unknown,formula,catalogue --cases 24 --duration 16",
         "rths blind --set tune --only unknown --seed 9601 --cases 16 --duration 12",
         "rths blind --set tune --only catalogue --seed 9701 --cases 20 --duration 12",
