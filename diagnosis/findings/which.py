@@ -13,7 +13,7 @@ from diagnosis.findings.certainty.intervals import Interval, intervals
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors.own_reading import errors
 from diagnosis.findings.verdict import EITHER, PartVerdict, loop_of_several
-from diagnosis.fits.fitting import Fit
+from diagnosis.fits.fitting import Fit, without_rest
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps
 from diagnosis.fits.worth import PRIOR_GAIN
@@ -74,7 +74,8 @@ def trusted(
     left = [item for item in named if item.outcome == "partly"]
     shares = [trust.share_named(item.search.explained) for item in left]
     probability = trust.less_by_freedom(min(near, trust.PARTLY.probability(signs), *shares), left)
-    return EITHER * probability if any(map(trust.of_the_plan, left)) else probability
+    doubtful = any(trust.of_the_plan(item) or without_rest(item.search.chosen) for item in left)
+    return EITHER * probability if doubtful else probability
 
 
 def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:

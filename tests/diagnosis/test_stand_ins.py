@@ -17,10 +17,11 @@ from diagnosis.findings.sensors.own_reading import machine_alone
 from diagnosis.findings.sensors.slow_noise import lone_noise
 from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge, other_cause
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
-from diagnosis.fits.fitting import Fit, at_end
+from diagnosis.fits.fitting import Fit, at_end, without_rest
 from diagnosis.fits.hypothesis import TOLERANCES, Values
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
+from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import PartOfGap
 from diagnosis.signals.noise_model import Source
@@ -353,3 +354,30 @@ def test_an_effect_whose_size_lies_at_the_end_of_its_range_explains_in_part_only
     limited = replace(found, data=data, chosen=replace(found.chosen, data=data))
     assert at_end(limited.chosen) == ("actuator.gain",)
     assert judge(limited).outcome == "partly"
+
+
+def test_friction_that_turns_round_over_all_speeds_is_a_drag_of_another_law() -> None:
+    effect = DATA.catalogue["column.friction"]
+    most = next(item.most for item in effect.parameters if item.name == "velocity")
+
+    def rubbing(velocity: float) -> Fit:
+        values = effect.values({"force": 900.0, "velocity": velocity})
+        return Fit(DATA, {"column.friction": values}, np.zeros(0), NOISY)
+
+    assert (at_end(rubbing(1e-3)), without_rest(rubbing(1e-3))) == ((), False)
+    assert (at_end(rubbing(most)), without_rest(rubbing(most))) == (("column.friction",), True)
+
+
+@pytest.mark.parametrize(("share", "unknown"), [(0.0, False), (0.25, True)])
+def test_a_small_gap_that_the_inputs_foresee_is_an_unknown_effect(
+    share: float, unknown: bool, cases: Cases
+) -> None:
+    whole = cases.record({}, duration=8.0)
+    part = lab_b(whole)
+    measured, stroke = part.measured.copy(), part.measured[:, 2]
+    noise = residuals.prepare(part, whole).white[1]
+    measured[:, 1] += share * noise * stroke / stroke.std()
+    bare = settling.settled(fitting.fit(residuals.prepare(part.replaced(measured=measured), whole), {}))
+    found = Search(bare.data, bare, bare, ())
+    assert found.left < SEEN
+    assert (judge(found).outcome == "unknown") == unknown
