@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from common.plan import read as plans
 from common.plan.kinds import TABLES_OF_KIND, known_kind
@@ -46,8 +45,10 @@ RANDOM = (
     ".clock",
 )  # effects without a waveform of their own: only their energy can be tested
 UNIFORM = math.sqrt(3.0)  # half the width of a uniform distribution over its standard deviation
-LEAST = 0.1  # of its true value, that a parameter of the nearest laboratory has
-STEP, ROUNDS = 0.05, 12  # for its slopes, standard deviations of the parameters; and how often it is moved
+NEAREST = 0.5, 2.0  # times its true value: within these a parameter of the nearest laboratory is looked for
+STEP = 0.05  # standard deviations of the parameters, for the slopes with which it is looked for
+RENEWED = 3  # slopes of a building, which swings on by itself: a frequency that is 5 % off is no small change
+ROUNDS, SETTLED = 10, 1e-2  # how often it is moved, and the share of its distance from which on that goes on
 Signals = Mapping[str, Array]
 Played = Callable[[Case, tuple[Laid, ...]], Signals]
 
@@ -90,7 +91,10 @@ def at_role(case: Case, role: str, laid: tuple[Laid, ...], run: Run) -> float:
 
 
 def nearest(case: Case, role: str, apart: Callable[[Case], Array]) -> float:
-    """The separation from the nearest laboratory without effects; `apart` is the whitened difference from a case."""
+    """The separation from the nearest laboratory without effects; `apart` is the whitened difference from a case.
+
+    Slopes follow the steps (Broyden, Mathematics of Computation 19 (1965) 577-593).
+    """
     known = tolerated(case, role)
     if not known:
         return float(np.linalg.norm(apart(case)))
@@ -98,13 +102,23 @@ def nearest(case: Case, role: str, apart: Callable[[Case], Array]) -> float:
     def left(z: Array) -> Array:
         return np.concatenate([apart(moved(case, role, known, z)), z])
 
-    def slopes(z: Array) -> Array:
-        here = left(z)
-        return np.stack([(left(z + step) - here) / STEP for step in STEP * np.eye(z.size)], axis=1)
-
-    low, start = (LEAST - 1.0) / np.array([item.width for item in known]), np.zeros(len(known))
-    found = least_squares(left, start, jac=slopes, bounds=(low, np.inf), ftol=1e-3, max_nfev=ROUNDS)
-    return math.sqrt(2.0 * found.cost)
+    z = np.zeros(len(known))
+    here, widths = left(z), np.array([item.width for item in known])
+    low, high = ((factor - 1.0) / widths for factor in NEAREST)
+    for _ in range(1 if role else RENEWED):
+        slopes = np.stack([(left(z + step) - here) / STEP for step in STEP * np.eye(z.size)], axis=1)
+        for _ in range(ROUNDS):
+            step = np.clip(z - np.linalg.lstsq(slopes, here)[0], low, high) - z
+            if not step.any():
+                break
+            there = left(z + step)
+            slopes += np.outer(there - here - slopes @ step, step) / (step @ step)
+            gain = float(here @ here - there @ there)
+            if gain > 0.0:
+                z, here = z + step, there
+            if 0.0 <= gain < SETTLED * float(here @ here):
+                break
+    return float(np.linalg.norm(here))
 
 
 def less(one: Signals, other: Signals) -> dict[str, Array]:
