@@ -58,7 +58,7 @@ def is_worth(bare: Fit, before: Fit, after: Fit) -> bool:
         return True
     # an effect that brings nominal parameters back as well needs to explain less: two signs of one cause
     freeing = prior > PRIOR_GAIN and excess(before) - excess(after) > HALF * excess(before)
-    return not cancelling(bare, sizes) and (freeing or refines(bare, before, after))
+    return not cancelling(bare, after, sizes) and (freeing or refines(bare, before, after))
 
 
 def gained(before: Fit, after: Fit) -> tuple[float, float]:
@@ -94,10 +94,22 @@ def changes(fit: Fit) -> list[Array]:
     return result
 
 
-def cancelling(bare: Fit, sizes: list[Array]) -> bool:
-    """Whether effects of a fit do far more than the gap they explain, and undo each other."""
+def cancelling(bare: Fit, fit: Fit, sizes: list[Array]) -> bool:
+    """Whether effects of a fit do far more than the gap they explain, and undo each other; `sizes` as `changes` gives.
+
+    Such an effect does far more both beside the others and by itself. One that keeps a motion small does so only beside
+    a law that is steep farther out.
+    """
     gap = max(float(np.max(np.mean(np.square(bare.reduced), axis=0))), 1.0)
-    return any(float(np.max(size)) > CANCELLED**2 * gap for size in sizes)
+    large = [
+        name for name, size in zip(fit.names, sizes, strict=True) if float(np.max(size)) > CANCELLED**2 * gap
+    ]
+    without = fitting.at(fit.data, {}, fit.z) if large else fit
+    for name in large:
+        change = fitting.at(fit.data, {name: fit.values[name]}, fit.z).reduced - without.reduced
+        if float(np.max(np.mean(np.square(change), axis=0))) > CANCELLED**2 * gap:
+            return True
+    return False
 
 
 def refines(bare: Fit, before: Fit, after: Fit) -> bool:

@@ -172,3 +172,15 @@ def test_an_effect_that_gains_no_more_than_chance_is_taken_away_at_the_end(
     assert fewest(both).names == one.names
     monkeypatch.setattr(candidates, "without", lambda *_: one)
     assert fewest(both) is both
+
+
+@pytest.mark.parametrize(("alone", "undone"), [(10.0, True), (1.0, False)])
+def test_effects_undo_each_other_only_if_one_of_them_does_far_more_by_itself_as_well(
+    monkeypatch: pytest.MonkeyPatch, alone: float, undone: bool
+) -> None:
+    """One that keeps a motion small does far more beside a law that is steep farther out than by itself."""
+    does: dict[tuple[str, ...], float] = {(): 0.0, ("a",): alone, ("b",): -10.0, ("a", "b"): 1.0}
+    monkeypatch.setattr(fitting, "at", lambda _, values, z: fit(dict(values), off=does[tuple(values)]))
+    bare, both = (fitting.at(DATA, {name: {} for name in names}, np.zeros(1)) for names in ("", "ab"))
+    sizes = [np.array([2.0 * worth.CANCELLED**2]), np.array([0.0])]
+    assert worth.cancelling(bare, both, sizes) is undone
