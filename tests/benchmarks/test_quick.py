@@ -15,6 +15,7 @@ from benchmarks.whole_test import Ending, ended_early, ending
 from common.plan.tables import SafetyTable
 
 IN_REAL_TIME = {"exchange", "real_time", "live", "start", "recorder"}  # tests/system/test_benchmarks.py
+LONG = {"catalogue", "opensees"}  # 6 s and 10 s, half of all of these benchmarks
 
 
 def plain(figures: list[BenchmarkFigure]) -> list[dict[str, Any]]:
@@ -27,7 +28,13 @@ def plain(figures: list[BenchmarkFigure]) -> list[dict[str, Any]]:
     return found
 
 
-@pytest.mark.parametrize("name", sorted(BENCHMARKS.keys() - IN_REAL_TIME - {"false_trips"}))
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in LONG else [])
+        for name in sorted(BENCHMARKS.keys() - IN_REAL_TIME - {"false_trips"})
+    ],
+)
 def test_a_benchmark_runs_and_gives_figures(name: str) -> None:
     assert any(figure["median"] is not None for figure in plain(BENCHMARKS[name](quick=True)))
 

@@ -81,6 +81,7 @@ def test_a_model_that_takes_long_is_fitted_where_others_leave_much(monkeypatch: 
     assert follow(part, way, left).keys() == {"clough"}
 
 
+@pytest.mark.slow
 def test_reinforced_concrete_is_found_by_its_layers() -> None:
     part = Driven()
     true = {"axial": 0.5, "concrete": 4.0, "spalling": 0.1, "hardening": -0.01}

@@ -195,7 +195,7 @@ def test_the_response_shows_effects_that_change_it_by_more_than_noise(
     assert not how_far.hardly_shown(Diagnosis(cast(Record, None)), far, changed)
 
 
-def test_noise_that_only_the_controller_read_is_no_fault_of_the_building(cases: Cases) -> None:
+def test_a_building_is_averaged_over_a_twelfth_of_its_shortest_period(cases: Cases) -> None:
     whole = cases.record()
     data = logged(whole)
     longer = over_longer(data, cast(LoggedBuilding, data.part))
@@ -205,6 +205,11 @@ def test_noise_that_only_the_controller_read_is_no_fault_of_the_building(cases: 
     assert np.array_equal(np.repeat(~longer.train, longer.group), ticks[: longer.groups * longer.group])
     short = logged(cases.record(duration=4.0))
     assert over_longer(short, cast(LoggedBuilding, short.part)) is None  # too few averages
+
+
+@pytest.mark.slow
+def test_noise_that_only_the_controller_read_is_no_fault_of_the_building(cases: Cases) -> None:
+    whole = cases.record()
     noise = 5e-3 * white(6, whole.ticks)  # m/s², in the acceleration that the master computed from it
     unread = relogged(whole, "acceleration", whole.signals["acceleration"] + noise)
     unread = relogged(

@@ -193,6 +193,7 @@ LEAKY: Effects = {
 }
 
 
+@pytest.mark.slow
 def test_an_effect_that_was_found_first_changes_its_law_beside_a_second_one(cases: Cases) -> None:
     report = cases.report(LEAKY)
     assert report["status"] == "explained"

@@ -158,6 +158,7 @@ def judged(whole: Record) -> PartVerdict:
     return judge(Search(bare.data, bare, bare, ()))
 
 
+@pytest.mark.slow
 def test_two_drifts_that_follow_from_one_motion_are_no_errors_of_two_sensors(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
     slow = 6e-5 * whole.time  # m, of a piston whose valve's null drifts
@@ -203,6 +204,7 @@ def test_slow_noise_that_the_plan_states_is_no_unknown_effect(cases: Cases) -> N
     assert lone_noise(replace(fit, data=louder)) == ""
 
 
+@pytest.mark.slow
 def test_loud_slow_noise_of_a_single_reading_beside_an_effect_may_be_an_unknown_one(cases: Cases) -> None:
     whole = cases.record({"table.gain": {"factor": 1.1}})
 

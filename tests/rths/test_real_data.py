@@ -72,6 +72,7 @@ def test_the_force_rigs_extra_delay_agrees_with_the_cross_correlation(
     assert lag + interval == pytest.approx(seen, abs=3e-3)  # a command is reached one interval later
 
 
+@pytest.mark.slow
 def test_the_unexplained_part_of_the_force_rigs_gap_is_reported(rig: tuple[Path, dict[str, Any]]) -> None:
     _, report = rig
     far = report["how_far"]

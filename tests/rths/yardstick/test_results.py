@@ -16,6 +16,8 @@ from validation.benchmark2020.tables import tables
 if TYPE_CHECKING:
     from tests.rths.yardstick.conftest import Played
 
+pytestmark = pytest.mark.slow  # plays the whole benchmark, in every worker that has one of these tests
+
 
 @pytest.mark.parametrize("case", sorted(TABLE_3))
 def test_the_sample_controllers_criteria_agree_with_table_3(played: Played, case: int) -> None:
