@@ -24,7 +24,7 @@ def afresh(fit: Fit, scales: Scales) -> list[Fit]:
         for place, law in enumerate(effect.laws)
         if not law.model
     ]
-    begun = [fitted(cheapest(bare, grid), ROUGH, 1) for grid in starts if grid]
+    begun = each(lambda grid: fitted(cheapest(bare, grid), ROUGH, 1), [grid for grid in starts if grid])
     leading = each(lambda item: fitted(item, STEPS, ROUNDS), sorted(begun, key=cost)[:LEADING])
     ended = each(lambda item: descended(item) if fitting.near(item, fit) else item, leading)
     return sorted((item for item in ended if item.cost < fit.cost - TIED), key=cost)
