@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from diagnosis.fits.hypothesis import Free, Problem, Values, lay
+from diagnosis.fits.hypothesis import Problem, Values, lay
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.threads import each
 from diagnosis.recorded.parts import Building
@@ -37,6 +37,8 @@ LOST = 100.0  # mean square residual in σ² from which on fitted nominal parame
 CLOSE = 3.0
 CHANCE = 3.0  # standard deviations by which a signal costs less than its noise by chance
 TIED = 9.0  # cost by which hypotheses differ that can be told apart: 3 standard deviations squared
+# Of the largest speed over which friction may turn round: beyond it is ten times what dry friction takes.
+TURNS = 0.5
 END = 1e-6  # of its range, within which an effect's parameter counts as at its end
 POLISHED = 12  # steps of a fit that leaves something, before that counts
 
@@ -222,29 +224,29 @@ def polished(found: Fit) -> Fit:
 def at_end(fit: Fit) -> tuple[str, ...]:
     """Effects of a fit of which a parameter that is no shape lies at the end of what is believed of it.
 
-    So do those of friction that turns round no faster than it may.
+    So do those of friction that hardly rests.
     """
-    return tuple(
-        item.effect
-        for item, least, most in ends(fit)
-        if ((least or most) and not item.parameter.shape) or (most and item.parameter.smoothing > 0.0)
-    )
-
-
-def without_rest(fit: Fit) -> bool:
-    """Whether friction of a fit turns round over all speeds that it may: a drag, and no dry friction.
-
-    Such a drag grows with the speed as a dashpot does, less and less, by whatever law.
-    """
-    return any(most and item.parameter.smoothing > 0.0 for item, _, most in ends(fit))
-
-
-def ends(fit: Fit) -> list[tuple[Free, bool, bool]]:
-    """The parameters of a fit's effects, and whether each lies at its least or at its most."""
     problem = Problem(fit.data, fit.values)
     low, high = problem.bounds()
     places = problem.place(fit.values, fit.z)
     edge = END * (high - low)
-    least, most = places <= low + edge, places >= high - edge
-    own = slice(fit.z.size, None)
-    return list(zip(problem.frees, least[own].tolist(), most[own].tolist(), strict=True))
+    far = (places <= low + edge) | (places >= high - edge)
+    ended = [
+        item.effect
+        for item, yes in zip(problem.frees, far[fit.z.size :], strict=True)
+        if yes and not item.parameter.shape
+    ]
+    return (*ended, *without_rest(fit))
+
+
+def without_rest(fit: Fit) -> tuple[str, ...]:
+    """Friction of a fit that turns round over all speeds: a drag, and no dry friction.
+
+    Such a drag grows with the speed as a dashpot does, less and less, by whatever law.
+    """
+    return tuple(
+        name
+        for name, given in fit.values.items()
+        for item in fit.data.catalogue[name].parameters
+        if item.smoothing > 0.0 and given[item.name] > TURNS * item.most
+    )
