@@ -11,7 +11,7 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import residuals
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.divided import parts_of
-from diagnosis.recorded.link import exchange
+from diagnosis.recorded.link.exchange import exchange_of
 from diagnosis.recorded.loop import RecordedLoop, overall
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
@@ -49,8 +49,8 @@ class RecordingGaps:
         names = tuple(name for name in record.responses if record.has(name))
         self.loop: RecordedLoop | None = None
         if record.simulable and record.has(*record.targets) and names and record.ground is not None:
-            used = exchange.exchange_of(record.run, record.ticks) if found.link else None
-            self.loop = RecordedLoop(record, record.ground, used, names)
+            exchange = exchange_of(record.run, record.ticks) if found.link else None
+            self.loop = RecordedLoop(record, record.ground, exchange, names)
         own = record is found.record
         whole = [verdict.search.data.part for verdict in found.verdicts] if own else parts_of(record)
         self._parts = [part for part in whole if not part.exact]

@@ -74,7 +74,7 @@ def trusted(
     left = [item for item in named if item.outcome == "partly"]
     shares = [trust.share_named(item.search.explained) for item in left]
     probability = trust.less_by_freedom(min(near, trust.PARTLY.probability(signs), *shares), left)
-    doubtful = any(trust.of_the_plan(item) or bool(without_rest(item.search.chosen)) for item in left)
+    doubtful = any(trust.of_the_plan(item) or without_rest(item.search.chosen) for item in left)
     return EITHER * probability if doubtful else probability
 
 

@@ -37,7 +37,7 @@ LOST = 100.0  # mean square residual in σ² from which on fitted nominal parame
 CLOSE = 3.0
 CHANCE = 3.0  # standard deviations by which a signal costs less than its noise by chance
 TIED = 9.0  # cost by which hypotheses differ that can be told apart: 3 standard deviations squared
-# Of the largest speed over which friction may turn round: beyond it is ten times what dry friction takes.
+# Of the largest speed over which friction may turn round, from which on it is none: dry friction takes a tenth of it.
 TURNS = 0.5
 END = 1e-6  # of its range, within which an effect's parameter counts as at its end
 POLISHED = 12  # steps of a fit that leaves something, before that counts
@@ -224,7 +224,7 @@ def polished(found: Fit) -> Fit:
 def at_end(fit: Fit) -> tuple[str, ...]:
     """Effects of a fit of which a parameter that is no shape lies at the end of what is believed of it.
 
-    So do those of friction that hardly rests.
+    Friction that hardly rests counts as well.
     """
     problem = Problem(fit.data, fit.values)
     low, high = problem.bounds()
@@ -240,7 +240,7 @@ def at_end(fit: Fit) -> tuple[str, ...]:
 
 
 def without_rest(fit: Fit) -> tuple[str, ...]:
-    """Friction of a fit that turns round over all speeds: a drag, and no dry friction.
+    """Friction of a fit that turns round over speeds so large that it is a drag, and no dry friction.
 
     Such a drag grows with the speed as a dashpot does, less and less, by whatever law.
     """
