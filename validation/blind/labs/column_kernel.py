@@ -13,7 +13,7 @@ from validation.blind.labs.parts.compiled import Array, jit
 from validation.blind.labs.parts.specimen import TrueSpecimen
 from validation.blind.labs.unlisted import actuator as unlisted_actuator
 from validation.blind.labs.unlisted import column as unlisted_column
-from validation.blind.labs.unlisted.effect import Held
+from validation.blind.labs.unlisted.effect import EffectMemory
 
 CONTACT = 1e4  # stiffness of the clevis over the specimen's: it takes 0.01 % of the motion, less than the sensor sees
 GREASE = 5e-3  # s, dashpot of the clevis over the specimen's stiffness: the specimen returns through the gap in 5 ms
@@ -52,7 +52,7 @@ class ColumnMemory(NamedTuple):
     approximation: Array  # of a dead time that is approximated
     specimen: Array
     filtered: Array  # of the readings
-    unlisted: Held
+    unlisted: EffectMemory
 
 
 @jit
@@ -117,7 +117,13 @@ def clevis(p: Servo, stiffness: float, state: Array, piston: float) -> float:
 
 @jit
 def look(
-    p: Servo, column: TrueSpecimen, state: Array, held: Held, wanted: float, piston: float, place: float
+    p: Servo,
+    column: TrueSpecimen,
+    state: Array,
+    held: EffectMemory,
+    wanted: float,
+    piston: float,
+    place: float,
 ) -> None:
     """Let the effect of no catalogue see the end of a step at `piston` and deformation `place`, both m."""
     seen, h = held.seen, p.step

@@ -19,7 +19,7 @@ from validation.blind.labs.column_kernel import ColumnMemory, Servo
 from validation.blind.labs.parts import delay, filters, specimen
 from validation.blind.labs.parts.specimen import TrueSpecimen
 from validation.blind.labs.unlisted import actuator as actuator_effects
-from validation.blind.labs.unlisted.effect import held
+from validation.blind.labs.unlisted.effect import at_rest
 
 STEP = 0.1e-3  # s, longest: a loop of 30 Hz, faster than any here, turns by 0.02 rad in it
 SIGNALS = ColumnMeasurement._fields
@@ -55,7 +55,7 @@ class TrueColumnLab:
             np.zeros(3),
             np.zeros(specimen.SIZE),
             np.zeros((len(SIGNALS), 3)),
-            held(values, actuator_effects.SEEN, actuator_effects.ADDED),
+            at_rest(values, actuator_effects.SEEN, actuator_effects.ADDED),
         )
         self._true: tuple[float, ...] = (0.0, 0.0)
 

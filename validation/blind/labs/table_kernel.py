@@ -12,7 +12,7 @@ from validation.blind.labs.parts import delay, filters, friction, mechanics
 from validation.blind.labs.parts.compiled import Array, jit
 from validation.blind.labs.unlisted import damper as unlisted_damper
 from validation.blind.labs.unlisted import table as unlisted_table
-from validation.blind.labs.unlisted.effect import Held
+from validation.blind.labs.unlisted.effect import EffectMemory
 
 # m/s; the mass moves at up to some 0.5 m/s, so that friction is Coulomb's but near a reversal.
 RUBBING = 1e-3  # scale of the regularised friction, of rail and table
@@ -40,7 +40,7 @@ class TableMemory(NamedTuple):
     approximation: Array  # of a dead time that is approximated
     work: Array  # (6, MOVING): rates, and room for the readings
     filtered: Array  # of the readings
-    unlisted: Held
+    unlisted: EffectMemory
 
 
 class TrueTable(NamedTuple):
@@ -202,7 +202,7 @@ def observe(
 
 
 @jit
-def look(p: TrueTable, state: Array, rate: Array, held: Held, wanted: float, push: float) -> None:
+def look(p: TrueTable, state: Array, rate: Array, held: EffectMemory, wanted: float, push: float) -> None:
     """Let the effect of no catalogue see the state and its `rate` at the end of a step."""
     seen = held.seen
     seen[unlisted_table.TIME] += p.step

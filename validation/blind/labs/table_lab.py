@@ -19,7 +19,7 @@ from validation.blind.labs.parts import delay
 from validation.blind.labs.table_effects import KNOWN
 from validation.blind.labs.table_kernel import TableMemory, TrueTable
 from validation.blind.labs.unlisted import table as table_effects
-from validation.blind.labs.unlisted.effect import held
+from validation.blind.labs.unlisted.effect import at_rest
 
 SIGNALS = TableMeasurement._fields
 
@@ -53,7 +53,7 @@ class TrueTableLab:
             np.zeros(3),
             np.zeros((6, table_kernel.MOVING)),
             np.zeros((len(SIGNALS), 3)),
-            held(values, table_effects.SEEN, table_effects.ADDED),
+            at_rest(values, table_effects.SEEN, table_effects.ADDED),
         )
         self._true: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 

@@ -29,8 +29,8 @@ class Unlisted(NamedTuple):
     alike: tuple[str, ...] = ()
 
 
-class Held(NamedTuple):
-    """An effect in a laboratory's memory."""
+class EffectMemory(NamedTuple):
+    """What a laboratory keeps for its effect of no catalogue."""
 
     sizes: Array  # its parameters
     kept: Array  # from step to step
@@ -38,10 +38,10 @@ class Held(NamedTuple):
     added: Array  # what holds over the next step
 
 
-def held(values: Values, seen: int, added: int) -> Held:
+def at_rest(values: Values, seen: int, added: int) -> EffectMemory:
     """Memory at rest for the effect among a laboratory's values, with so many places."""
     sizes = np.array([values.get(f"unlisted.{name}", 0.0) for name in SIZES])
-    return Held(sizes, np.zeros(KEPT), np.zeros(seen), np.zeros(added))
+    return EffectMemory(sizes, np.zeros(KEPT), np.zeros(seen), np.zeros(added))
 
 
 def known(effects: Mapping[str, Unlisted], place: str = "unlisted") -> dict[str, KnownEffect]:
