@@ -15,7 +15,7 @@ from benchmarks.whole_test import Ending, ended_early, ending
 from common.plan.tables import SafetyTable
 
 IN_REAL_TIME = {"exchange", "real_time", "live", "start", "recorder"}  # tests/system/test_benchmarks.py
-LONG = {"catalogue", "opensees"}  # 6 s and 10 s, half of all of these benchmarks
+LONG = {"catalogue", "opensees", "scale", "sweep"}  # 3 to 10 s each, most of what all of them take
 
 
 def plain(figures: list[BenchmarkFigure]) -> list[dict[str, Any]]:

@@ -89,6 +89,7 @@ def test_a_second_recording_narrows_the_confidence_interval(cases: Cases) -> Non
     assert widths[1] < 0.9 * widths[0]
 
 
+@pytest.mark.slow
 def test_a_cause_in_only_one_of_two_recordings_is_not_accepted(cases: Cases) -> None:
     clean, stuck = cases.record(duration=4.0), cases.record(FRICTION, duration=4.0)
     part = joined(lab_b(stuck), [lab_b(clean)], 4)

@@ -82,6 +82,7 @@ def test_spectra_are_predicted_as_a_replay_is(cases: Cases) -> None:
     assert np.all(apart < (0.002, 0.08))
 
 
+@pytest.mark.slow
 def test_a_loop_with_feed_forward_under_a_swinging_mass_is_found_as_a_whole(cases: Cases) -> None:
     whole, command = cases.record(), wanted(TICKS)
     data = residuals.prepare(table(whole, command, shaken()), whole)

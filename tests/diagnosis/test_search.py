@@ -136,6 +136,7 @@ def test_what_effects_leave_on_one_side_is_searched_with_nothing_withheld(
 STOP: Effects = {"damper.stroke_stop": {"stroke": 0.04, "stiffness": 2000.0}}
 
 
+@pytest.mark.slow
 def test_an_end_stop_is_found_with_its_stroke(cases: Cases) -> None:
     report = cases.report(STOP, duration=6.0)  # after some impacts
     assert named(report) == ["damper.stroke_stop"]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from tests.rths.report.pages import Balanced
 
@@ -25,6 +26,7 @@ def cycles(path: Path) -> None:
     path.write_text("y,f\n" + "".join(f"{a:.4f},{b:.3f}\n" for a, b in zip(y, force, strict=True)))
 
 
+@pytest.mark.slow
 def test_a_report_on_static_data_holds_no_times_and_no_effects_on_rates(
     call: Any, capsys: Any, tmp_path: Path
 ) -> None:

@@ -130,6 +130,7 @@ def test_a_recording_contains_nothing_about_its_hidden_effect(tmp_path: Path) ->
     assert run.ticks("master") == 750
 
 
+@pytest.mark.slow
 def test_the_recorded_size_is_that_of_the_effect(tmp_path: Path) -> None:
     made = cases(4, "catalogue", duration=4.0, effects=["damper.friction"])
     weak, *_, strong = sorted(made, key=lambda case: case.laid[0].parameters["force"])
