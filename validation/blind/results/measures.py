@@ -183,7 +183,9 @@ def further(outcomes: Sequence[Outcome]) -> list[Measure]:
         rate("visible unknown effect: reported, site right", strange, lambda item: item.right),
         rate("unknown effect that an oracle sees: reported, site right", noticed, lambda item: item.right),
         rate(
-            "… a wrong name that is sure", noticed, lambda item: item.surplus > 0 and item.probability >= SURE
+            "unknown effect that an oracle sees: a wrong name that is sure",
+            noticed,
+            lambda item: item.surplus > 0 and item.probability >= SURE,
         ),
         rate("both of a pair whose strongest is visible", pairs, lambda item: item.named),
         *closed_on_another_motion(outcomes),
