@@ -19,17 +19,32 @@ from models.compiled import jit
 COULOMB = 1e-6  # m/s; with v₀ up to this value the force does not decrease at low speed: Coulomb friction
 # Ratios of speeds from which on 1 − tanh and exp are below what a number holds beside 1: neither needs to be computed.
 TANH_IS_ONE, EXP_IS_NOTHING = 20.0, 40.0
+SHORT = 1e-4  # of an exponent: the fourth power of such a step is below what a number holds beside 1
 
 
 @jit
 def left(rate: float, velocity: float, drop: float, speed: float) -> float:
     """The factor on a friction force at a rate (m/s): v₀ = `velocity` and v_s = `speed` in m/s, d = `drop`."""
     size = abs(rate)
-    share = 1.0 if velocity <= COULOMB or size > TANH_IS_ONE * velocity else np.tanh(size / velocity)
+    share = 1.0
+    if velocity > COULOMB and size <= TANH_IS_ONE * velocity:
+        fallen = np.exp(-2.0 * size / velocity)
+        share = (1.0 - fallen) / (1.0 + fallen)  # tanh, whose own function takes twice as long
     if drop != 0.0:
         beyond = 0.0 if size > EXP_IS_NOTHING * speed else np.exp(-size / speed)
         share *= 1.0 - drop * (1.0 - beyond)
     return float(share)
+
+
+@jit
+def faded(left: float, far: float, step: float) -> float:
+    """e^(−far), the share of a bend that bristles still have after a way: by a series over a short last step.
+
+    `left` is that share before this step, e^(step − far).
+    """
+    if abs(step) > SHORT:
+        return float(np.exp(-far))
+    return left * (1.0 - step * (1.0 - step * (0.5 - step / 6.0)))
 
 
 @jit

@@ -75,9 +75,7 @@ def searched(bare: Fit, scales: Scales) -> Search:
     chosen = pruned(bare, chosen)
     most = MOST + len(chosen.names) - count(chosen)
     chosen, as_good = trade.traded(bare, chosen, first, scales, most)
-    if remaining(chosen) < worth.LOUD and not of_one_loop(
-        chosen
-    ):  # what leaves more lacks its largest effects yet
+    if may_lack(bare, chosen):
         chosen = together(chosen, scales, beside if chosen is before else None)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
     if (more := trade.two_for_one(chosen, others, scales, TOGETHER)) is not chosen:
@@ -86,7 +84,7 @@ def searched(bare: Fit, scales: Scales) -> Search:
     found = Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others)))
     found = plainest(believed(likeliest(found)))
     stands = found.chosen
-    if set(stands.names) != set(chosen.names) and remaining(stands) < worth.LOUD and not of_one_loop(stands):
+    if set(stands.names) != set(chosen.names) and may_lack(bare, stands):
         stands = together(stands, scales)  # what an exchanged effect hid
     if (chosen := fewest(stands)) is found.chosen:
         return found
@@ -148,6 +146,15 @@ def by_impacts(bare: Fit, fit: Fit) -> Fit:
 def count(fit: Fit) -> int:
     """How many effects of a fit can imitate something else; those that were found together as one loop are one."""
     return sum(not fit.data.catalogue[name].motionless for name in single(fit)) + bool(of_one_loop(fit))
+
+
+def may_lack(bare: Fit, fit: Fit) -> bool:
+    """Whether effects may be missing beside those of a fit that explain too little by themselves.
+
+    What leaves more than `LOUD` lacks its largest effects yet. So does what explains less than each further one must.
+    """
+    begun = excess(fit) <= (1.0 - STEP_OF_LEFT) * excess(bare)
+    return begun and remaining(fit) < worth.LOUD and not of_one_loop(fit)
 
 
 def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fit:

@@ -29,6 +29,9 @@ RIVALS = 2  # single effects behind the best one that are tried with a second on
 # Of what one effect by itself leaves: less must be left after a few steps under another of its laws if this is to do
 # what two effects do. A spring and dashpot in series beside a column leave 0.3 then, in place of a dashpot and a lag.
 NEARING = 0.5
+# Of what is left without effects: less must be left with one that follows another effect closely, so that this one may
+# be found in its place. Where the best effect of all leaves more, nothing of the catalogue alone is near the cause.
+FOLLOWED = 0.5
 TRIED = 3  # candidates that are fitted in such a place: they must come close at once
 REFITTED = 8  # steps over all seconds of hypotheses that leave as much of those seen
 PULLED = 3.84  # of Σ z²: a single effect that truly is none brings back as much in one of twenty cases (χ²)
@@ -94,7 +97,8 @@ def traded(
     `first` are the fits with one effect, best first; no description has more than `most` effects.
     """
     found = [*joined(chosen, scales), *alone(chosen), *under_others(chosen)]
-    if len(chosen.names) == 1 and worth.is_gap(chosen) and not chosen.data.part.exact:
+    follows = len(chosen.names) == 1 and excess(chosen) < FOLLOWED * excess(bare)
+    if follows and worth.is_gap(chosen) and not chosen.data.part.exact:
         found += afresh(chosen, scales)
     if len(chosen.names) < most:
         found += parted(bare, chosen, scales)
@@ -183,11 +187,9 @@ def paired(bare: Fit, fit: Fit, first: list[Fit], scales: Scales) -> list[Fit]:
     """Fits with two effects, without the one that a fit has by itself, where that one leaves more than noise."""
     if len(fit.names) != 1 or not leaves(fit):
         return []
-    result = []
-    for rival in [item for item in first if item.names != fit.names][:RIVALS]:
-        others = candidates.extended(rival, scales, count=TRIED, known=fit)[:1]
-        result += [item for item in others if worth.is_worth(bare, fit, item)]
-    return result
+    rivals = [item for item in first if item.names != fit.names][:RIVALS]
+    best = each(lambda rival: candidates.extended(rival, scales, count=TRIED, known=fit)[:1], rivals)
+    return [item for others in best for item in others if worth.is_worth(bare, fit, item)]
 
 
 def released(fit: Fit, scales: Scales) -> list[Fit]:

@@ -59,7 +59,7 @@ from models.registry import Array
 # Of Halley's method: four of them leave an error of rounding as long as friction stops the mass, within a segment, over
 # no more than a thousand times the presliding; 200 N on 16 kg do so over 0.8 µm.
 CLIMBS = 5
-ARRIVED = 1e-5  # of the distance: the next step would be its cube, below what a number holds
+ARRIVED = 1e-17  # of the distance: what is then still missing, about this much at most, is below what a number holds
 
 
 @jit
@@ -278,13 +278,14 @@ def bent(
     far, lost = abs(ahead), length * yields * abs(end - force)
     per = 1.0 / presliding
     moved = max(far / (1.0 + lost * per), far - lost)
+    left = np.exp(-moved * per)
     for _ in range(CLIMBS):
-        left = np.exp(-moved * per)
         missing = far - moved - lost * (1.0 - left)
         curved = lost * per * left
         slope = 1.0 + curved
         step = 2.0 * missing * slope / (2.0 * slope * slope - missing * curved * per)
         moved += step
-        if abs(step) <= ARRIVED * moved:
+        left = friction.faded(left, moved * per, step * per)
+        if curved * (step * per) ** 2 * abs(step) <= ARRIVED * moved:
             break
-    return friction.dahl(force, moved if ahead > 0.0 else -moved, least, most, presliding)
+    return float(end + (force - end) * left)

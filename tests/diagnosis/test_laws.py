@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -253,6 +253,25 @@ def test_a_law_behind_the_first_starts_as_weak_as_its_effect_is() -> None:
     bare = fitting.fit(data_of(HardlyRubbing()), {})
     best = unlike_first(bare, Sizes())[0]
     assert best.values["force"] == pytest.approx(HardlyRubbing.FORCE, rel=0.5)
+
+
+def test_starts_are_compared_over_a_beginning_where_that_is_a_small_part(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bare, at, seen = fitting.fit(data_of(HardlyRubbing()), {}), fitting.at, [0]
+
+    def counted(data: Data, *given: Any) -> Fit:
+        seen[-1] += data.groups
+        return at(data, *given)
+
+    monkeypatch.setattr(fitting, "at", counted)
+    whole = unlike_first(bare, Sizes())  # a beginning lasts 6 s at least, of 8
+    seen.append(0)
+    monkeypatch.setattr(fitting, "SHORTEST", 1.0)
+    brief = unlike_first(bare, Sizes())
+    assert brief[0].gain == pytest.approx(whole[0].gain, rel=1e-3)
+    assert brief[0].values["force"] == pytest.approx(whole[0].values["force"], rel=1e-3)
+    assert seen[1] < 0.7 * seen[0]
 
 
 def test_a_limit_that_is_neared_gradually_is_looked_for_far_above_what_is_reached() -> None:

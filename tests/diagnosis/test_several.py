@@ -11,7 +11,7 @@ import pytest
 from diagnosis.fits import candidates, fitting, residuals, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import together
+from diagnosis.fits.search import may_lack, together
 from models.registry import Array
 from tests.diagnosis.cases import Cases, Effects, lab_a
 from tests.diagnosis.test_equivalents import DATA, NOISY
@@ -80,6 +80,16 @@ def test_a_faint_rest_is_not_filled_up_with_effects(
     monkeypatch.setattr(candidates, "best_laws", lambda *_: [two])
     monkeypatch.setattr(candidates, "without", lambda *_: one)
     assert together(one, None) is (two if taken else one)  # type: ignore[arg-type, comparison-overlap]
+
+
+@pytest.mark.parametrize(
+    ("whole", "left", "looked"), [(6.0, 4.0, True), (4.5, 4.0, False), (120.0, 40.0, False)]
+)
+def test_small_effects_are_looked_for_beside_one_that_explains_as_much_as_each_of_them_must(
+    whole: float, left: float, looked: bool
+) -> None:
+    chosen = replace(fit("", off=left), values={"column.stiffness": {"factor": 1.1}})
+    assert may_lack(fit("", off=whole), chosen) is looked
 
 
 def test_an_effect_that_came_before_is_exchanged_beside_one_that_it_stood_in_for(

@@ -66,16 +66,18 @@ def test_a_fit_that_has_not_reached_its_end_is_moved_on_before_two_effects_are_h
     assert parted(far, ended, None) == [two]  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("strained", "taken"), [(True, True), (False, False)])
-def test_an_effect_that_strains_nominal_parameters_is_held_against_all_others_afresh(
-    monkeypatch: pytest.MonkeyPatch, strained: bool, taken: bool
+@pytest.mark.parametrize(
+    ("strained", "whole", "taken"), [(True, 3.0, True), (True, 0.55, False), (False, 3.0, False)]
+)
+def test_an_effect_that_explains_most_and_strains_nominal_parameters_is_held_against_all_others_afresh(
+    monkeypatch: pytest.MonkeyPatch, strained: bool, whole: float, taken: bool
 ) -> None:
-    chosen, other = fit({"damper.friction": COULOMB}, 0.5), fit(SIDED)
+    bare, chosen, other = fit({}, whole), fit({"damper.friction": COULOMB}, 0.5), fit(SIDED)
     monkeypatch.setattr(worth, "is_gap", lambda item: strained and item is chosen)
     monkeypatch.setattr(trade, "afresh", lambda *_: [other])
     for name in ("parted", "paired", "released"):
         monkeypatch.setattr(trade, name, lambda *_: [])
-    assert trade.traded(chosen, chosen, [], None, 3)[0] is (other if taken else chosen)  # type: ignore[arg-type]
+    assert trade.traded(bare, chosen, [], None, 3)[0] is (other if taken else chosen)  # type: ignore[arg-type]
 
 
 def test_another_law_with_as_many_parameters_must_fit_better_and_one_with_more_much_better() -> None:
