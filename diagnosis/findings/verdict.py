@@ -21,6 +21,7 @@ from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, gaps, leaves, model_error
 from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN
 from diagnosis.recorded.nuisances import LoggedReadings
+from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.report.records import Outcome
 from models.registry import Array
 
@@ -110,9 +111,9 @@ def other_cause(search: Search) -> bool:
 
     It is another part of a loop of which several values are named, another place of a machine in the place of offsets,
     or another law of a machine of which a reading is named as well that shows nothing else: both are one function of
-    the same motion.
+    the same motion. A small gap may have any cause.
     """
-    return bool(loop_of_several(search) or one_place(search) or errors(search.chosen))
+    return bool(loop_of_several(search) or one_place(search) or errors(search.chosen) or small(search))
 
 
 def loop_of_several(search: Search) -> str:
@@ -184,9 +185,10 @@ def unnamed(search: Search) -> PartVerdict:
 
 def without_effects(search: Search) -> Outcome:
     """The outcome where no effect is named: unknown, explained by the tolerances, or nothing above the noise."""
-    if search.left > SEEN or pinned(search.chosen) or follows(search.chosen):
+    fit = search.chosen
+    if search.left > SEEN or leaves(fit, model_error(fit)) or pinned(fit) or follows(fit):
         return "unknown"
-    nominal = fitting.at(search.data, {}, np.zeros(search.chosen.z.size))
+    nominal = fitting.at(search.data, {}, np.zeros(fit.z.size))
     return "tolerances" if leaves(nominal) else "none"
 
 
@@ -212,9 +214,14 @@ def how_well(search: Search) -> Outcome:
     fit = search.chosen
     strained = bool(pinned(fit)) or farthest(fit) < HALF or bool(at_end(fit))
     everywhere = fitting.at(replace(fit.data, vague=None), fit.values, fit.z)  # behind impacts as well
-    if not (strained or leaves(everywhere, allowed(search)) or unproven(search)):
+    if not (strained or leaves(everywhere, allowed(search)) or unproven(search) or small(search)):
         return "explained"
     return "partly" if search.explained > HALF else "unknown"
+
+
+def small(search: Search) -> bool:
+    """Whether a gap is so small that two good solutions of one model may differ by it: its cause may be anything."""
+    return search.data.erring < MODEL_ERROR
 
 
 def imitated(search: Search) -> bool:

@@ -12,7 +12,7 @@ from diagnosis.findings.certainty import trust
 from diagnosis.findings.certainty.intervals import Interval, intervals
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors.own_reading import errors
-from diagnosis.findings.verdict import EITHER, PartVerdict, loop_of_several
+from diagnosis.findings.verdict import EITHER, PartVerdict, loop_of_several, small
 from diagnosis.fits.fitting import Fit, without_rest
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps
@@ -74,7 +74,9 @@ def trusted(
     left = [item for item in named if item.outcome == "partly"]
     shares = [trust.share_named(item.search.explained) for item in left]
     probability = trust.less_by_freedom(min(near, trust.PARTLY.probability(signs), *shares), left)
-    doubtful = any(trust.of_the_plan(item) or without_rest(item.search.chosen) for item in left)
+    doubtful = any(
+        trust.of_the_plan(item) or without_rest(item.search.chosen) or small(item.search) for item in left
+    )
     return EITHER * probability if doubtful else probability
 
 
@@ -110,7 +112,12 @@ def other_numbers(verdict: PartVerdict) -> list[str]:
 
 
 def other_causes(verdict: PartVerdict) -> list[str]:
-    """A sentence where several values of the plan of one transfer system, or a machine and its reading, are named."""
+    """A sentence where another cause may look the same as what is named."""
+    if small(verdict.search):
+        return [
+            f"What {described(verdict.search.chosen)} explains is so small that two good solutions of one model may "
+            "differ by it. Something else as small may look the same."
+        ]
     loop = loop_of_several(verdict.search)
     if not loop:
         return [

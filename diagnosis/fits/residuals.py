@@ -64,6 +64,7 @@ class Data:
     heard: Array | None = None  # (signals,) coloured noise that other signals' gaps made doubtful, 0 for none
     # (groups, signals) times the noise that an averaged sample behind an impact is known to; None where none is
     vague: Array | None = None
+    erring: float = MODEL_ERROR  # share of a reading's rms that a good solution of the model may err by
 
     @cached_property
     def _systems(self) -> dict[bytes, System]:
@@ -281,7 +282,7 @@ def withheld_ticks(ticks: int, interval: float) -> Mask:
 
 def measured_by(data: Data, white: Array) -> Data:
     """The data with residuals in units of a noise (signals,)."""
-    least = (EXACT if data.part.exact else MODEL_ERROR) * data.part.level + 1e-15
+    least = (EXACT if data.part.exact else data.erring) * data.part.level + 1e-15
     rounding = np.where(
         data.rounded > STEPPING * white, COARSE * data.rounded, data.rounded / math.sqrt(12.0)
     )

@@ -13,7 +13,6 @@ import numpy as np
 from diagnosis.fits import sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.sensor_noise import Foreseen
-from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.signals.noise_model import NoiseModel
 from models.registry import Array
 
@@ -69,7 +68,7 @@ def model_error(fit: Fit) -> Array:
     """What two good solutions of one model may differ by, (signals,) over σ; zero where the part is exact."""
     if fit.data.part.exact:
         return np.zeros(fit.data.sigma.size)
-    return np.asarray(BOTH * MODEL_ERROR * fit.data.part.level / fit.data.sigma)
+    return np.asarray(BOTH * fit.data.erring * fit.data.part.level / fit.data.sigma)
 
 
 def leaves(fit: Fit, allowed: Array | None = None) -> bool:

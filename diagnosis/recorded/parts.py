@@ -45,8 +45,9 @@ UNREST = 0.05  # first value over the largest one from which on a record does no
 PIECE, REACH = 0.25, 10
 # Systems of which a part keeps what they did: as many as the slopes of a fit take, and no more numbers than these.
 PLAYED, NUMBERS = 8, 4_000_000
-# Difference of two good solutions of one model over a measured signal's rms; nothing below is a gap.
-MODEL_ERROR = 1e-3
+# Difference of two good solutions of one model over a measured signal's rms; nothing below is a gap where effects are
+# named. The second is of two very good ones: solved in steps of 0.1 ms they differ by 1e-6 and less.
+MODEL_ERROR, FINE_ERROR = 1e-3, 2e-5
 # Standard deviations within which a logger's channels are expected. LATE: a filter of 40 Hz, usual before sampling at
 # 100 Hz to 200 Hz, delays by 4 ms. ALIKE and UNLIKE: channels of one logger differ by a quarter of an interval or by
 # half of their delay, so that a channel without delay is two tolerances off. CALIBRATED: load cells and displacement

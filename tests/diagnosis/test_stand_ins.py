@@ -202,6 +202,8 @@ def test_slow_noise_that_the_plan_states_is_no_unknown_effect(cases: Cases) -> N
     fit = bare_fit(wandering(whole, "damper_stroke", wander=WANDER))
     louder = replace(fit.data, planned=fit.data.white / 5.0)  # as all readings are
     assert lone_noise(replace(fit, data=louder)) == ""
+    alone = replace(fit.data, planned=fit.data.white / np.array([1.0, 1.0, 1.5, 1.0]))
+    assert lone_noise(replace(fit, data=alone)) == "damper_stroke"
 
 
 @pytest.mark.slow

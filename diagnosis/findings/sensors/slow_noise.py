@@ -14,11 +14,13 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, likeliest
 from diagnosis.fits.threads import each
+from diagnosis.recorded.parts import FINE_ERROR
 
 # Noise of a reading at its loudest frequency over that at the highest ones, from which on it is doubted where no other
 # reading of its laboratory has more than QUIET, or all others have so many times less. Pink noise of a test has less
 # than LONE.
 LONE, QUIET = 10.0, 2.0
+SLACK = 1.25  # of the noise of a reading over the plan's beside that of others
 AGAIN = 6  # steps of a fit under another noise, from where it was
 
 
@@ -33,9 +35,13 @@ def under_less_noise(search: Search) -> tuple[Search, str]:
         return search, ""
     data, name = sensor_noise.whitened(search.chosen), ""
     if not moves(fitting.at(data, search.chosen.values, search.chosen.z)):
-        data, name = in_common(search.chosen), lone_noise(search.chosen)
+        name = lone_noise(search.chosen)
         if not name:
             return search, ""
+        fine = replace(
+            search.chosen.data, erring=search.chosen.data.erring if search.chosen.names else FINE_ERROR
+        )
+        data = in_common(replace(search.chosen, data=fine))
     return fitted_again(search, data), name
 
 
@@ -74,13 +80,16 @@ def lone_noise(fit: Fit) -> str:
 
 
 def expected(fit: Fit, place: int) -> bool:
-    """Whether the noise of a reading, over what the plan says of it, is no louder than on half of all readings.
+    """Whether the noise of a reading, over what the plan says of it, is no louder than on half of all other readings.
 
-    It may be twice as loud anyway, because a plan rarely knows a sensor's noise better than within a factor of two.
+    It may be louder by as much as the plan errs for these, and a quarter: a plan rarely knows noise better than that.
     """
     planned = fit.data.planned
     if planned is None or not planned[place] > 0.0:
         return False
-    over = fit.data.white[planned > 0.0] / planned[planned > 0.0]
+    known = planned > 0.0
+    known[place] = False
+    others = fit.data.white[known] / planned[known]
+    usual, apart = (np.median(others), others.max() / others.min()) if others.size > 1 else (1.0, LEAST)
     own = fit.data.white[place] / planned[place]
-    return bool(own <= max(LEAST, float(np.median(over))))
+    return bool(own <= usual * min(LEAST, SLACK * apart))

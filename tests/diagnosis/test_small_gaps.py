@@ -1,0 +1,60 @@
+"""Gaps that are smaller than what two good solutions of one model differ by."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.findings.verdict import judge, other_cause, small
+from diagnosis.findings.which import other_causes
+from diagnosis.fits import fitting, residuals, settling
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import search
+from diagnosis.fits.unexplained import leaves, model_error
+from diagnosis.recorded.parts import FINE_ERROR, MODEL_ERROR, LaboratoryPart
+from diagnosis.recorded.record import Record
+from tests.diagnosis.cases import Cases, lab_a, lab_b
+
+STROKE = 2  # place of the damper's stroke among the readings
+WIDTH = 2e-4  # of the stroke's rms, by which its reading lags
+
+
+def lagging(whole: Record, share: float) -> LaboratoryPart:
+    """The slave's laboratory whose stroke's reading lags by a hysteresis of its transducer."""
+    part = lab_b(whole)
+    measured, stroke = part.measured.copy(), part.measured[:, STROKE]
+    measured[:, STROKE] -= (
+        share * stroke.std() * np.sign(np.gradient(part.predict(whole.systems[part.role])[:, STROKE]))
+    )
+    return part.replaced(measured=measured)
+
+
+@pytest.mark.parametrize(("share", "outcome"), [(0.0, "tolerances"), (WIDTH, "unknown")])
+def test_a_gap_that_two_good_solutions_may_differ_by_is_seen(
+    share: float, outcome: str, cases: Cases
+) -> None:
+    whole = cases.record({}, duration=8.0)
+    data = residuals.prepare(lagging(whole, share), whole)
+    usual = settling.settled(fitting.fit(data, {}))
+    assert not leaves(usual, model_error(usual))
+    found = search(data, Scales(whole))
+    assert found.data.erring == (FINE_ERROR if share else MODEL_ERROR)
+    assert judge(found).outcome == outcome
+
+
+def test_the_name_of_so_small_a_gap_is_never_sure(cases: Cases) -> None:
+    whole = cases.record({"column.stiffness": {"factor": 1.2}}, duration=8.0)
+    found = search(residuals.prepare(lab_a(whole), whole), Scales(whole))
+    assert judge(found).outcome == "explained"
+    data = replace(found.data, erring=FINE_ERROR)
+    fits = (found.commissioned, found.chosen, *found.alternatives)
+    bare, chosen, *others = (fitting.at(data, fit.values, fit.z) for fit in fits)
+    faint = replace(found, data=data, commissioned=bare, chosen=chosen, alternatives=tuple(others))
+    assert small(faint)
+    assert other_cause(faint)
+    verdict = judge(faint)
+    assert verdict.outcome == "partly"
+    assert verdict.probability < 0.5
+    assert "two good solutions" in other_causes(verdict)[0]
