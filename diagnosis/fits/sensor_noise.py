@@ -236,10 +236,9 @@ def foreseen(fit: Fit) -> list[Foreseen]:
     data = fit.data
     if data.related is None or data.related.count != data.groups:
         return [Foreseen(0.0, 0.0)] * data.sigma.size
-    reduced = fit.reduced if data.factors is None else colour.from_the_past(fit.reduced, data.factors)
-    said = data.related.predict(reduced)
+    said = data.related.predict(fit.reduced)
     energy = np.sum(said**2, axis=0)
-    along = np.sum(reduced * said, axis=0)
+    along = np.sum(fit.reduced * said, axis=0)
     tails = np.array([item.tails for item in data.noise]) if data.noise else np.ones(data.sigma.size)
     sure = np.where(energy > 0.0, along / np.sqrt(np.maximum(energy, 1e-300)) / tails, 0.0)
     ratio = np.sqrt(np.maximum(2.0 * along - energy, 0.0) / (data.groups * data.group))

@@ -155,22 +155,3 @@ def whitened(x: Array, factors: Array) -> Array:
     ends = np.ix_(np.r_[: min(ENDS, len(x)), max(0, len(x) - ENDS) : len(x)], np.ptp(factors, axis=0) > 0.0)
     result[ends] = np.clip(result[ends], -LAST, LAST)
     return result
-
-
-def from_the_past(x: Array, factors: Array) -> Array:
-    """Series (n, m), whitened by factors (n, m), as a filter of the same gains that knows the past only whitens them.
-
-    Of all filters of one gain that of minimum phase undoes what a machine does that is as loud at its resonance: what
-    is left are the forces on it when they act, while whitening without a phase spreads them over many periods.
-
-    Source: A. V. Oppenheim, R. W. Schafer, Discrete-Time Signal Processing (1989), ch. 12: the phase is that of the
-    cepstrum folded onto positive times.
-    """
-    count = len(x)
-    gains = np.log(np.vstack([factors, factors[-1:]]))
-    cepstrum = np.fft.irfft(gains, axis=0)
-    cepstrum[1:count] *= 2.0
-    cepstrum[count + 1 :] = 0.0
-    phase = np.imag(np.fft.rfft(cepstrum, axis=0))
-    turned = np.fft.rfft(x, 2 * count, axis=0) * np.exp(1j * phase)
-    return np.asarray(np.fft.irfft(turned, 2 * count, axis=0)[:count])

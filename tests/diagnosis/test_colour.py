@@ -150,13 +150,3 @@ def test_the_part_that_follows_from_the_inputs_is_predicted_and_noise_is_not() -
     said = Crosswise(x).predict(np.column_stack([rubbing + noise, noise]))
     assert np.corrcoef(said[:, 0], rubbing)[0, 1] > 0.8
     assert np.std(said[:, 1]) < 0.2 * np.std(noise)
-
-
-def test_whitening_from_the_past_gives_the_pushes_back_that_moved_a_resonator() -> None:
-    pushes, ringing = white(61, 4000), [1.0, -1.9, 0.95]
-    places = np.arange(pushes.size) / pushes.size
-    _, gain = signal.freqz([1.0], ringing, worN=np.pi * places)
-    factors = 1.0 / np.abs(gain)[:, None]
-    still = colour.whitened(signal.lfilter([1.0], ringing, pushes)[:, None], factors)
-    assert np.corrcoef(colour.from_the_past(still, factors)[:, 0], pushes)[0, 1] > 0.999
-    assert np.corrcoef(still[:, 0], pushes)[0, 1] < 0.5
