@@ -18,7 +18,7 @@ from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, exchanged_pair
 from diagnosis.fits.trade import tied
-from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, gaps, leaves, model_error
+from diagnosis.fits.unexplained import MATERIAL, gaps, leaves, model_error
 from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN
 from diagnosis.recorded.nuisances import LoggedReadings
 from diagnosis.recorded.parts import MODEL_ERROR
@@ -186,23 +186,10 @@ def unnamed(search: Search) -> PartVerdict:
 def without_effects(search: Search) -> Outcome:
     """The outcome where no effect is named: unknown, explained by the tolerances, or nothing above the noise."""
     fit = search.chosen
-    if search.left > SEEN or leaves(fit, model_error(fit)) or pinned(fit) or follows(fit):
+    if search.left > SEEN or leaves(fit, model_error(fit)) or pinned(fit):
         return "unknown"
     nominal = fitting.at(search.data, {}, np.zeros(fit.z.size))
     return "tolerances" if leaves(nominal) else "none"
-
-
-def follows(fit: Fit) -> bool:
-    """Whether what a fit leaves in a reading is small, but systematic, and foreseen by the inputs as well.
-
-    Noise would have to be both by chance. It must be more than two good solutions of one model differ by.
-    """
-    least = np.maximum(MATERIAL, model_error(fit))
-    both = zip(gaps(fit, fit.data.group), sensor_noise.foreseen(fit), least, strict=True)
-    return any(
-        min(left.ratio, known.ratio) > limit and min(left.significance, known.significance) > SIGNIFICANT
-        for left, known, limit in both
-    )
 
 
 def how_well(search: Search) -> Outcome:

@@ -15,7 +15,7 @@ import numpy as np
 
 from common.errors import InputError
 from diagnosis.recorded.logged_building import LoggedBuilding
-from diagnosis.recorded.parts import EXACT, MODEL_ERROR, Part
+from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, Part
 from diagnosis.recorded.record import Record
 from diagnosis.signals import colour
 from diagnosis.signals.ceiling import Crosswise
@@ -135,6 +135,11 @@ class Data:
     def whole(self) -> Data:
         """The same with nothing withheld."""
         return replace(self, train=np.ones(self.groups, dtype=bool))
+
+    @property
+    def fine(self) -> Data:
+        """The same measured by what two very good solutions of one model differ by."""
+        return measured_by(replace(self, erring=FINE_ERROR), self.white)
 
     @property
     def beside(self) -> Array:

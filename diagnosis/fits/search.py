@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.fits import candidates, contact, fitting, hypothesis, residuals, settling, trade, worth
+from diagnosis.fits import candidates, contact, fitting, hypothesis, settling, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.laws.coupled import coupled
 from diagnosis.fits.laws.loop import of_one_loop, single, whole_loops
@@ -16,7 +16,6 @@ from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, leaves, model_error, remaining
-from diagnosis.recorded.parts import FINE_ERROR
 
 MOST = 3  # effects of one part, the bias of a sensor aside: more of them can imitate any residual
 # Effects of one part that leave only noise, each of them needed for that; the share of what is left that each must
@@ -54,16 +53,14 @@ class Search:
 def search(data: Data, scales: Scales) -> Search:
     """What was found in a part, with nothing withheld where what it leaves acts for a short time only.
 
-    Where nothing is found, what two good solutions of one model may differ by could hide a gap that two very good ones
-    show.
+    Where no gap is larger than what two good solutions of one model may differ by, a smaller one is looked for.
     """
     bare = settling.settled(fitting.fit(data, {}))
     found = within(data, bare, scales)
-    if found.chosen.names or data.part.exact:
+    if found.chosen.names or data.part.exact or leaves(found.chosen, model_error(found.chosen)):
         return found
-    finely = residuals.measured_by(replace(data, erring=FINE_ERROR), data.white)
-    fine = fitting.polished(settling.settled(fitting.fit(finely, {}, bare.z)))
-    return within(finely, fine, scales) if leaves(fine, model_error(fine)) else found
+    fine = fitting.polished(settling.settled(fitting.fit(data.fine, {}, bare.z)))
+    return within(data.fine, fine, scales) if leaves(fine, model_error(fine)) else found
 
 
 def within(data: Data, bare: Fit, scales: Scales) -> Search:

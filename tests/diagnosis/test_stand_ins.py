@@ -204,6 +204,8 @@ def test_slow_noise_that_the_plan_states_is_no_unknown_effect(cases: Cases) -> N
     assert lone_noise(replace(fit, data=louder)) == ""
     alone = replace(fit.data, planned=fit.data.white / np.array([1.0, 1.0, 1.5, 1.0]))
     assert lone_noise(replace(fit, data=alone)) == "damper_stroke"
+    silent = replace(fit.data, white=fit.data.white * np.array([0.0, 1.0, 1.0, 1.0]))
+    assert lone_noise(replace(fit, data=replace(silent, planned=fit.data.white))) == ""
 
 
 @pytest.mark.slow

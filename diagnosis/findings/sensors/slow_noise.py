@@ -14,7 +14,6 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, likeliest
 from diagnosis.fits.threads import each
-from diagnosis.recorded.parts import FINE_ERROR
 
 # Noise of a reading at its loudest frequency over that at the highest ones, from which on it is doubted where no other
 # reading of its laboratory has more than QUIET, or all others have so many times less. Pink noise of a test has less
@@ -38,10 +37,8 @@ def under_less_noise(search: Search) -> tuple[Search, str]:
         name = lone_noise(search.chosen)
         if not name:
             return search, ""
-        fine = replace(
-            search.chosen.data, erring=search.chosen.data.erring if search.chosen.names else FINE_ERROR
-        )
-        data = in_common(replace(search.chosen, data=fine))
+        fit = search.chosen
+        data = in_common(fit if fit.names else replace(fit, data=fit.data.fine))
     return fitted_again(search, data), name
 
 
@@ -87,7 +84,7 @@ def expected(fit: Fit, place: int) -> bool:
     planned = fit.data.planned
     if planned is None or not planned[place] > 0.0:
         return False
-    known = planned > 0.0
+    known = (planned > 0.0) & (fit.data.white > 0.0)
     known[place] = False
     others = fit.data.white[known] / planned[known]
     usual, apart = (np.median(others), others.max() / others.min()) if others.size > 1 else (1.0, LEAST)
