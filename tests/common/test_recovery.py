@@ -372,6 +372,7 @@ def describes_nothing(data: bytes) -> bool:
     return b"\nrths.Master" not in data
 
 
+@pytest.mark.slow
 def test_recovery_uses_far_less_memory_than_the_size_of_the_file(tmp_path: Path) -> None:
     path = tmp_path / "big.mcap"
     recording, noise = Recording(path, "trial", 1, TOPICS), random.Random(1)

@@ -58,6 +58,7 @@ def test_an_effect_keeps_its_name_beside_a_loud_hum(cases: Cases) -> None:
     assert next(item.effects for item in found.verdicts if item.effects) == ("column.friction",)
 
 
+@pytest.mark.slow
 def test_an_effect_keeps_its_name_beside_loud_coloured_noise(cases: Cases) -> None:
     soft = cases.record({"damper.stiffness": {"factor": 0.7}}, duration=STRONGEST)
     found = examine(imported(soft, noisy))

@@ -54,7 +54,9 @@ def numbers(value: Any) -> Iterator[float]:
         assert value is None or type(value) in (int, str, bool), type(value)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=pytest.mark.slow) if kind == "two" else kind for kind in KINDS]
+)
 def test_a_report_fits_its_schema_adds_up_and_gives_a_page(cases: Cases, kind: str) -> None:
     report = report_of(cases, kind)
     assert report["version"] == 2

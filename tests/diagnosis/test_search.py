@@ -180,6 +180,7 @@ def test_two_effects_in_two_laboratories_are_both_found(cases: Cases) -> None:
     assert estimate(report, "damper.friction", "force") == pytest.approx(3.0, rel=0.05)
 
 
+@pytest.mark.slow
 def test_two_effects_in_one_laboratory_are_both_found(cases: Cases) -> None:
     report = cases.report(
         {"actuator.backlash": {"width": 3e-4}, "column.yielding": {"yield_displacement": 1.5e-3}}

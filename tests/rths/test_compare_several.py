@@ -70,6 +70,7 @@ def test_histories_are_written_for_other_programs(call: Any, three: list[Path], 
     assert force[[name == "strong" for name in names]] == pytest.approx(expected / 1e3, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_page_fits_screens_phones_and_paper(call: Any, three: list[Path], tmp_path: Path) -> None:
     page = tmp_path / "all.html"
     assert call("compare", *three, "--html", page) == 0

@@ -213,7 +213,7 @@ BENCHES = {
 
 @pytest.mark.parametrize(
     ("part", "clean"),
-    [("actuator", True), ("table", False), ("damper", False)],
+    [("actuator", True), ("table", False), pytest.param("damper", False, marks=pytest.mark.slow)],
     ids=["actuator, clean", "table with an effect", "damper with an effect"],
 )
 def test_a_bench_test_of_one_part_is_diagnosed(

@@ -82,15 +82,10 @@ def test_the_unexplained_part_of_the_force_rigs_gap_is_reported(rig: tuple[Path,
     assert report["where"][0]["site"] == "actuator"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "rows"),
-    [
-        ("8-D22_bondslip", 4),
-        *(
-            pytest.param(name, 1, marks=pytest.mark.slow)
-            for name in ("4-D22", "8-D22", "4-D22_bondslip", "8-D22_bondslip")
-        ),
-    ],
+    [("8-D22_bondslip", 4), *((name, 1) for name in ("4-D22", "8-D22", "4-D22_bondslip", "8-D22_bondslip"))],
 )
 def test_a_fibre_column_is_found_to_yield_and_to_soften_with_its_largest_drift(
     name: str, rows: int, tmp_path: Path

@@ -80,6 +80,7 @@ def served(
     assert process.returncode == 0
 
 
+@pytest.mark.slow
 def test_a_test_is_shown_during_its_run_and_after_its_end_on_any_screen(
     served: tuple[str, threading.Thread, threading.Event], tmp_path: Path
 ) -> None:

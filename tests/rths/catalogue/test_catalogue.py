@@ -224,6 +224,7 @@ def test_a_folder_that_may_not_be_written_is_named_with_the_remedy(
     assert "delete it" not in err
 
 
+@pytest.mark.slow
 def test_the_page_of_the_catalogue_sorts_and_filters(call: Call, folder: Path, tmp_path: Path) -> None:
     if browser.chromium() is None:
         pytest.skip("there is no Chromium on this machine")

@@ -254,6 +254,7 @@ def test_single_cases_of_a_set_are_the_same_as_among_all(
     }
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("inside")
 def test_the_command_passes_where_every_goal_is_met(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
