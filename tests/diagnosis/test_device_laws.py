@@ -122,6 +122,7 @@ def test_a_relaxing_part_is_one_effect_also_where_two_are_found_that_do_the_same
     assert values["coefficient"] == pytest.approx(part.BRANCH * part.TIME, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_specimen_that_no_first_law_is_like_is_found_by_its_force_over_deformation() -> None:
     data = data_of(Driven())
     bare = fitting.fit(data, {})

@@ -23,6 +23,7 @@ def on_part(found: Diagnosis, name: str) -> PartVerdict:
     return next(item for item in found.verdicts if item.search.data.part.name == name)
 
 
+@pytest.mark.slow
 def test_noise_that_shakes_a_whole_table_is_none_of_its_accelerometer(cases: Cases) -> None:
     whole = cases.record()
     part = lab_b(whole)

@@ -1,4 +1,4 @@
-"""Pairs of effects in one laboratory: one that hides behind the other is found, one that is not there taken away."""
+"""Pairs of effects: both are found, one that hides behind the other too, and one that is not there is taken away."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from diagnosis.fits.search import fewest, pruned
 from diagnosis.signals import colour
 from diagnosis.signals.noise_model import NoiseModel
 from models.registry import Array
-from tests.diagnosis.cases import Cases, Effects, lab_b
+from tests.diagnosis.cases import STRONGEST, Cases, Effects, estimate, lab_b, named
 from tests.diagnosis.test_equivalents import DATA, NOISY
 
 LOUDER: Effects = {
@@ -184,3 +184,22 @@ def test_effects_undo_each_other_only_if_one_of_them_does_far_more_by_itself_as_
     bare, both = (fitting.at(DATA, {name: {} for name in names}, np.zeros(1)) for names in ("", "ab"))
     sizes = [np.array([2.0 * worth.CANCELLED**2]), np.array([0.0])]
     assert worth.cancelling(bare, both, sizes) is undone
+
+
+def test_two_effects_in_two_laboratories_are_both_found(cases: Cases) -> None:
+    report = cases.report(
+        {"column.friction": {"force": 900.0}, "damper.friction": {"force": 3.0}}, duration=STRONGEST
+    )
+    assert named(report) == ["column.friction", "damper.friction"]
+    assert estimate(report, "column.friction", "force") == pytest.approx(900.0, rel=0.05)
+    assert estimate(report, "damper.friction", "force") == pytest.approx(3.0, rel=0.05)
+
+
+@pytest.mark.slow
+def test_two_effects_in_one_laboratory_are_both_found(cases: Cases) -> None:
+    report = cases.report(
+        {"actuator.backlash": {"width": 3e-4}, "column.yielding": {"yield_displacement": 1.5e-3}},
+        duration=STRONGEST,
+    )
+    assert named(report) == ["actuator.backlash", "column.yielding"]
+    assert estimate(report, "actuator.backlash", "width") == pytest.approx(3e-4, rel=0.05)

@@ -70,7 +70,10 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
     return Cases(tmp_path_factory, STRONGEST)
 
 
-@pytest.mark.parametrize(("effect", "values", "near"), ALONE, ids=[name for name, _, _ in ALONE])
+@pytest.mark.parametrize(
+    ("effect", "values", "near"),
+    [pytest.param(*row, id=row[0], marks=pytest.mark.slow if row[0] in RARE else ()) for row in ALONE],
+)
 def test_an_effect_is_found_with_its_parameters(
     cases: Cases, effect: str, values: dict[str, float], near: dict[str, float]
 ) -> None:
@@ -171,22 +174,6 @@ def test_a_delayed_force_reading_is_found_with_its_delay_in_the_verdict_and_the_
 def test_a_short_delay_and_a_lag_of_the_same_size_are_reported_as_equivalent(cases: Cases) -> None:
     report = cases.report({LATE: {"delay": 0.0006}})
     assert [LATE, "sensor.column_force.lag"] in [sorted(names) for names in report["equivalent"]]
-
-
-def test_two_effects_in_two_laboratories_are_both_found(cases: Cases) -> None:
-    report = cases.report({"column.friction": {"force": 900.0}, "damper.friction": {"force": 3.0}})
-    assert named(report) == ["column.friction", "damper.friction"]
-    assert estimate(report, "column.friction", "force") == pytest.approx(900.0, rel=0.05)
-    assert estimate(report, "damper.friction", "force") == pytest.approx(3.0, rel=0.05)
-
-
-@pytest.mark.slow
-def test_two_effects_in_one_laboratory_are_both_found(cases: Cases) -> None:
-    report = cases.report(
-        {"actuator.backlash": {"width": 3e-4}, "column.yielding": {"yield_displacement": 1.5e-3}}
-    )
-    assert named(report) == ["actuator.backlash", "column.yielding"]
-    assert estimate(report, "actuator.backlash", "width") == pytest.approx(3e-4, rel=0.05)
 
 
 LEAKY: Effects = {

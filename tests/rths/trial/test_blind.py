@@ -156,6 +156,7 @@ def test_the_diagnosing_process_sees_recordings_only(tmp_path: Path, monkeypatch
         assert all("reports" in name or "complaints" in name for name in seen["there"])
 
 
+@pytest.mark.slow
 def test_a_failing_diagnosis_does_not_affect_the_other_cases(tmp_path: Path) -> None:
     list(record_all(cases(2), tmp_path))
     answers = diagnose_all(tmp_path, diagnosis=f"{HERE}:broken")

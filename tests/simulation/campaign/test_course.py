@@ -128,6 +128,7 @@ def uninterrupted() -> tuple[bytes, int]:
         return found, killer.passed
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 20), st.floats(0.0, 1.0)), max_size=3))
 def test_a_campaign_continues_from_any_point_at_which_it_was_killed(kills: list[tuple[int, float]]) -> None:
