@@ -28,6 +28,9 @@ LITTLE = 0.5
 # Times what the first law promises: a law that differs from it in detail only, as friction by direction and speed,
 # promises no more.
 FAR_MORE = 2.0
+# Share of what effects leave that a further one must explain under the law that promises most, for its other laws to be
+# fitted. To be worth it, these would have to explain four tenths.
+BARELY = 0.05
 # Effort: a fit takes many predictions of the part, a projection few.
 FITTED = 6  # candidates of the projection that are fitted at every step
 FINE = 3  # of these, candidates that are fitted to their end,
@@ -129,8 +132,14 @@ def in_order(found: Fit, fit: Fit) -> Fit:
 
 
 def best_laws(fit: Fit, scales: Scales) -> list[Fit]:
-    """Fits with one effect more, best first, each effect under the law of its mechanism that leaves least."""
-    return in_best_laws(with_stop(fit, extended(fit, scales)))
+    """Fits with one effect more, best first, each effect under the law of its mechanism that leaves least.
+
+    Beside other effects no further laws are fitted where hardly anything is explained under those that promise most.
+    """
+    fits = with_stop(fit, extended(fit, scales))
+    if fit.names and fits and excess(fits[0]) > (1.0 - BARELY) * excess(fit):
+        return fits
+    return in_best_laws(fits)
 
 
 def without(fit: Fit, name: str) -> Fit:

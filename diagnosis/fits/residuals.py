@@ -207,7 +207,7 @@ class Data:
 
 def finite(values: Array) -> Array:
     """Residuals of which none is further away than `FAR`."""
-    return np.clip(np.nan_to_num(values, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
+    return np.fmax(np.fmin(values, FAR), -FAR)  # a value that is no number becomes FAR
 
 
 def filled(x: Array, there: Mask) -> Array:

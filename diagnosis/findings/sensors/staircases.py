@@ -26,6 +26,7 @@ APART, TRIED = 0.1, 4000
 SHARE = 0.25
 PART = 0.1  # of a step, that a reading moves on from one sample that is looked at to the next
 ENOUGH = 200  # such samples, without which nothing is said of steps
+AT_ONCE = 100_000  # samples of residuals that are looked at side by side
 COARSEST = 0.5  # of the largest reading, above which steps look like a bend of the scale
 
 
@@ -92,18 +93,22 @@ def staircase(predicted: Array, residual: Array) -> Stairs | None:
     count = min(TRIED, 16 + math.ceil(math.log(MOST / LEAST) * reach / (LEAST * usual * APART)))
     steps = usual * np.geomspace(LEAST, MOST, count)
     steps = steps[steps < COARSEST * reach]
-    left = np.array([np.var(residual - error(predicted, step)) for step in steps])
+    left = remaining(predicted, residual, steps)
     best = int(np.argmin(left)) if steps.size else 0
     if not steps.size or left[best] > (1.0 - SHARE) * np.var(residual):
         return None
     near = np.linspace(steps[max(best - 1, 0)], steps[min(best + 1, steps.size - 1)], count)
-    left = np.array([np.var(residual - error(predicted, step)) for step in near])
+    left = remaining(predicted, residual, near)
     step = float(near[np.argmin(left)])
     # the place of the outermost level is known as well as the reading there
     half = step * math.sqrt(float(np.min(left))) / reach + float(near[1] - near[0])
     return Stairs(step, step - half, step + half)
 
 
-def error(predicted: Array, step: float) -> Array:
-    """What rounding to a step adds to a reading (ticks,)."""
-    return np.asarray(step * np.round(predicted / step) - predicted)
+def remaining(predicted: Array, residual: Array, steps: Array) -> Array:
+    """Variance of a residual (ticks,) once the rounding of a reading (ticks,) to each step is taken away, (steps,)."""
+    several = max(1, AT_ONCE // predicted.size)
+    parts = np.array_split(steps, math.ceil(steps.size / several)) if steps.size else []
+    rounded = (part[:, None] * np.round(predicted / part[:, None]) for part in parts)
+    whole = predicted + residual
+    return np.concatenate([np.zeros(0), *(np.var(whole - error, axis=1) for error in rounded)])

@@ -13,6 +13,7 @@ from diagnosis.fits.fitting import TIED, Fit, excess
 from diagnosis.fits.hypothesis import Problem, Values
 from diagnosis.fits.laws.specimen import SLOW, follow, path
 from diagnosis.fits.laws.starts import starts
+from diagnosis.fits.residuals import Data
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import remaining
 from diagnosis.fits.worth import SUSPICIOUS
@@ -20,7 +21,8 @@ from laboratories.effects.effect import Effect
 from models.registry import Array
 
 FITTED = 4  # of an effect's laws, those with the best starts
-LAID = 3  # of the starts of a law over a beginning, those that are laid over the whole test
+# Of the starts of a law over a brief beginning, those that are laid over a longer one; of these, over the whole test.
+LONGER, LAID = 12, 3
 ROUGH = 3  # steps of a first fit, after which laws are held against each other
 LEADING = 4  # of all laws, those that are fitted to their end
 STEPS, ROUNDS = 8, 2  # of such a fit
@@ -139,9 +141,15 @@ def cheapest(fit: Fit, starts: Sequence[Values]) -> Fit:
     The beginning holds most of what the fit leaves, so that those which cost much there cost much over the whole test.
     """
     z = np.zeros(fit.z.size)
-    short = fitting.beginning(fit.data, fit, fitting.MOSTLY)
-    over = sorted(each(lambda values: fitting.at(short, values, z), starts), key=cost)[:LAID]
-    return min(each(lambda item: fitting.at(fit.data, item.values, z), over), key=cost)
+
+    def laid(over: Data, starts: Sequence[Values]) -> list[Fit]:
+        return sorted(each(lambda values: fitting.at(over, values, z), starts), key=cost)
+
+    for share, most in ((fitting.BRIEFLY, LONGER), (fitting.MOSTLY, LAID)):
+        if len(starts) > most:
+            over = fitting.beginning(fit.data, fit, share)
+            starts = [item.values for item in laid(over, starts)[:most]]
+    return laid(fit.data, starts)[0]
 
 
 def last(fit: Fit) -> Effect:

@@ -13,10 +13,8 @@ from diagnosis.fits.threads import each
 from laboratories.effects.effect import Effect
 
 MUCH_SMALLER = 0.25  # share of a start, below which fits from there take many steps: they end after a few
-BRIEF = 0.3  # share of what a fit leaves that a beginning must hold over which starts of one law are compared
-FULLER = (
-    3  # times as long as such a beginning must be all that a fit covers for it to be worth its own slopes
-)
+# Times as long as such a beginning must be all that a fit covers, for it to be worth its own slopes.
+FULLER = 2
 LAID = 2  # of the starts of a law over such a beginning, those that are looked at over all
 AS_MUCH = 0.9  # of what a start promises: what it does is no straight line if a smaller one promises less
 
@@ -31,7 +29,7 @@ def unlike_first(fit: Fit, scales: Scales) -> list[ScreenedEffect]:
     deformation.
     """
     plane = Plane(fit)
-    short = fitting.beginning(fit.data, fit, BRIEF)
+    short = fitting.beginning(fit.data, fit, fitting.BRIEFLY)
     few = short.groups * FULLER > fit.data.groups
     brief = plane if few else Plane(fitting.at(short, fit.values, fit.z))
     ways = [
