@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -15,7 +15,7 @@ from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import filters, logger, report, where
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.sensors import readings, staircases
+from diagnosis.findings.sensors import jumps, outliers, readings, staircases, uneven_noise
 from diagnosis.findings.sensors.loud_noise import no_noise
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.sensors.staircases import Stairs
@@ -140,6 +140,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     verdicts, noisy = machines_first(record, verdicts, noisy)
     loud = noise(verdicts, heard)
     sensors = [*noisy, *staircases.findings(hidden, record, logged=late is not None)]
+    verdicts = by_themselves(verdicts, {*held, *(record.catalogue[item.effect].signal for item in sensors)})
     result = Diagnosis(
         record,
         verdicts,
@@ -154,12 +155,25 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
             *not_recorded(record),
             *reversed_signs(datas),
             *repeating(held),
+            *outliers.told(verdicts),
+            *(verdict.own.text for verdict in verdicts if verdict.own is not None and verdict.own.text),
             *doubted(verdicts),
             *where.undecided(verdicts),
         ],
-        [law for verdict in verdicts if verdict.outcome in UNNAMED for law in learn(verdict.search.chosen)],
+        [law for verdict in verdicts if learnable(verdict) for law in learn(verdict.search.chosen)],
     )
     return replace(result, warnings=[*result.warnings, *logger.remarks(result)])
+
+
+def by_themselves(verdicts: Sequence[PartVerdict], aside: Collection[str]) -> list[PartVerdict]:
+    """The verdicts with errors of single readings that nothing else shows; something is known of readings `aside`."""
+    found = map(jumps.own_error, map(outliers.own_error, verdicts))
+    return [uneven_noise.own_error(verdict, aside) for verdict in found]
+
+
+def learnable(verdict: PartVerdict) -> bool:
+    """Whether something without a name is left that a law could tell: an error of one reading by itself has none."""
+    return verdict.outcome in UNNAMED and verdict.own is None
 
 
 def noise(verdicts: Sequence[PartVerdict], of: Callable[[Search], Array]) -> dict[str, float]:

@@ -7,6 +7,7 @@ import numpy as np
 from common.errors import InputError
 from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.search import Search
 from diagnosis.fits.unexplained import gaps
@@ -54,7 +55,7 @@ def ceilings(found: Diagnosis) -> tuple[Ceiling, ...]:
             continue
         flexible = flexible_share(found, search)
         if flexible is not None:
-            site = where.unexplained(search.data, search.chosen).site
+            site = where.unexplained(verdict).site
             if verdict.effects:
                 site = where.traces(search.data, search.chosen)[0].site
             result.append(Ceiling(site=site, flexible=flexible, catalogue=max(0.0, search.explained)))
@@ -86,20 +87,21 @@ def flexible_share(found: Diagnosis, search: Search) -> float | None:
 def unknowns(found: Diagnosis) -> tuple[Unknown, ...]:
     """Descriptions of the residuals that no effect of the catalogue explains, the largest over its noise first."""
     left = [item for item in found.verdicts if item.outcome in ("unknown", "partly")]
-    return tuple(described(found, item.search) for item in sorted(left, key=lambda item: -item.search.left))
+    return tuple(described(found, item) for item in sorted(left, key=lambda item: -item.search.left))
 
 
-def described(found: Diagnosis, search: Search) -> Unknown:
+def described(found: Diagnosis, verdict: PartVerdict) -> Unknown:
     """Description of the residual that the chosen effects leave in one part."""
+    search, trace = verdict.search, where.unexplained(verdict)
     data = search.data
-    place = worst(search, search.chosen)
+    place = data.part.signals.index(trace.signal)
     residual = data.residual(hypothesis.lay(data, search.chosen.z, search.chosen.values))[:, place]
     interval = found.record.plan.test.interval
     shares = dependence(found, search, residual, float(data.sigma[place]))
     spectrum = windows.bands(residual, float(data.white[place]), interval)
     peak = int(np.argmax(spectrum.residual[1:])) + 1 if spectrum.residual.size > 1 else 0
     return Unknown(
-        site=where.unexplained(data, search.chosen).site,
+        site=trace.site,
         depends_on=tuple(item for item in shares if (item.share or 0.0) > FAINT),
         frequency=float(spectrum.frequency[peak]),
         amplitude=float(np.sqrt(2.0 * np.mean(residual**2))),

@@ -300,7 +300,7 @@ def all_traces(found: Diagnosis) -> list[SiteTrace]:
     for verdict in found.verdicts:
         result += where.traces(verdict.search.data, verdict.search.chosen)
         if verdict.outcome in UNNAMED:
-            extra = where.unexplained(verdict.search.data, verdict.search.chosen)
+            extra = where.unexplained(verdict)
             if all(item.site != extra.site for item in result):  # a named site keeps the trace of its effects
                 result.append(extra)
     for reading in found.readings:
@@ -313,7 +313,7 @@ def all_traces(found: Diagnosis) -> list[SiteTrace]:
         lab = next(lab for lab in found.record.labs if name in lab.measured)
         if not any(may_be_missed(item, name, share) for item in found.verdicts):
             continue
-        site = lab.site(f"sensor.{name.removeprefix(lab.ahead)}")
+        site = lab.sensor(name)
         gone = {site, *(one.site(place) for one in found.record.labs for place in LIKE_MISSED)}
         result = [
             *(item for item in result if item.site not in gone),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,6 +53,17 @@ WITHOUT_GAP: tuple[Outcome, ...] = ("none", "tolerances")  # that leave nothing 
 UNNAMED: tuple[Outcome, ...] = ("partly", "unknown")  # in which some of the gap has no named cause
 
 
+class OwnError(NamedTuple):
+    """An error of one reading by itself: no motion predicts it, and it is not its sensor's noise."""
+
+    signal: str
+    ratio: float  # its rms over that of the noise
+    sites: tuple[
+        str, ...
+    ] = ()  # from which it may come, the likeliest first; none where the readings must tell
+    text: str = ""  # a sentence on it, empty where another warning says it
+
+
 @dataclass(frozen=True)
 class PartVerdict:
     """The verdict on one part."""
@@ -63,6 +75,7 @@ class PartVerdict:
     equivalent: tuple[tuple[str, ...], ...]
     joined: Search | None = None  # in all recordings, where several were searched at once
     doubted: str = ""  # the reading of which the gap might also be slow noise, empty for none
+    own: OwnError | None = None  # the gap, where it is an error of one reading by itself
 
     @property
     def searched(self) -> Search:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -67,24 +67,36 @@ def shown(site: str, data: Data, change: Array) -> SiteTrace:
     )
 
 
-def unexplained(data: Data, fit: Fit) -> SiteTrace:
-    """Trace of what a fit leaves, at the site where it most likely arises."""
+def unexplained(verdict: PartVerdict) -> SiteTrace:
+    """Trace of what the effects of a verdict leave, at the site where it most likely arises."""
+    data, fit, own = verdict.search.data, verdict.search.chosen, verdict.own
+    if own is not None:
+        data = replace(data, spikes=None)
     residual = data.residual(hypothesis.lay(data, fit.z, fit.values)) / data.sigma
     left = [item.ratio for item in gaps(fit, data.group)]
+    place = int(np.argmax(left)) if own is None else data.part.signals.index(own.signal)
+    return SiteTrace(
+        sites(verdict)[0],
+        residual[:, place],
+        left[place] if own is None else own.ratio,
+        data.part.signals[place],
+        float(data.sigma[place]),
+        dict(zip(data.part.signals, (data.steady(residual) * data.sigma).T, strict=True)),
+    )
+
+
+def sites(verdict: PartVerdict) -> tuple[str, ...]:
+    """The sites from which what the effects of a verdict leave may come, the likeliest first."""
+    fit, own = verdict.search.chosen, verdict.own
+    if own is not None and own.sites:
+        return own.sites
     far = [
         site for site, dot, _ in (name.rpartition(".") for name in pinned(fit)) if dot
     ]  # a logger has no site
     # a parameter at its bound that leaves nothing to be seen took the gap upon itself
-    site = far[0] if far and max(left) < SEEN else culprits(fit)[0]
-    kept = residual[:, int(np.argmax(left))]
-    return SiteTrace(
-        site,
-        kept,
-        max(left),
-        data.part.signals[int(np.argmax(left))],
-        float(data.sigma[int(np.argmax(left))]),
-        dict(zip(data.part.signals, (data.steady(residual) * data.sigma).T, strict=True)),
-    )
+    if own is None and far and verdict.search.left < SEEN:
+        return (far[0],)
+    return culprits(fit)
 
 
 @lru_cache(maxsize=ASKED)
@@ -107,7 +119,7 @@ def culprits(fit: Fit) -> tuple[str, ...]:
 
 def undecided(verdicts: Sequence[PartVerdict]) -> list[str]:
     """A sentence for each unknown effect that may lie at several sites."""
-    found = [culprits(item.search.chosen) for item in verdicts if item.outcome == "unknown"]
+    found = [sites(item) for item in verdicts if item.outcome == "unknown"]
     return [
         f"What no effect explains may arise at {' or at '.join(sites)}: these signals cannot tell them apart."
         for sites in found

@@ -202,7 +202,7 @@ def nothing(found: Diagnosis) -> float:
         fit = verdict.search.chosen
         sizes = np.abs(fit.z) / math.sqrt(PRIOR_GAIN)
         left = [item.ratio / MATERIAL for item in gaps(fit, fit.data.group)]
-        worst = max([worst, *map(float, sizes), *left])
+        worst = max([worst, *map(float, sizes), *left, float(verdict.own is not None)])
     return float(1.0 - 0.3 * min(worst, 1.0) ** 4)
 
 

@@ -42,6 +42,10 @@ class RecordedLaboratory:
         """A site's name, or an effect's, in the record."""
         return self.before + name
 
+    def sensor(self, name: str) -> str:
+        """The site of the sensor behind a measured signal of the record."""
+        return self.site(f"sensor.{name.removeprefix(self.ahead)}")
+
     @property
     def rows(self) -> tuple[Signal, ...]:
         """The signals written and measured in it, with units, under the names of the record."""

@@ -32,9 +32,14 @@ def deviation(apart: Array) -> Array:
     return np.asarray(1.4826 * np.interp(np.arange(apart.size), starts, medians))
 
 
+def beyond(residual: Array) -> Array:
+    """How far (n,) each sample of a residual is from the median of its neighbours."""
+    return np.asarray(np.abs(residual - ndimage.median_filter(residual, NEIGHBOURS, mode="nearest")))
+
+
 def spikes(residual: Array) -> Mask:
     """Where a residual (n,) has spikes: at most `LONGEST` samples in a row far from the median around them."""
-    apart = np.abs(residual - ndimage.median_filter(residual, NEIGHBOURS, mode="nearest"))
+    apart = beyond(residual)
     slowly = np.abs(residual - ndimage.median_filter(residual, WIDER, mode="nearest"))
     sharp, wide = deviation(apart), deviation(slowly)
     above = (apart > BEYOND * sharp) & (apart > AS_MUCH * wide) & (sharp > 0.0)

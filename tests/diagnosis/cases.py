@@ -20,7 +20,10 @@ from common.reality import reality
 from common.recording.imported import IMPORT
 from common.recording.reader import read
 from common.terminal import cli
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import residuals
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.search import Search
 from diagnosis.recorded import record
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
@@ -100,6 +103,11 @@ def imported(whole: Record, change: Callable[[Array], Array] = lambda x: x, unit
     }
     metadata = whole.run.metadata | {IMPORT: {"data": "measurements.csv"}}
     return replace(whole, signals=signals, run=replace(whole.run, metadata=metadata))
+
+
+def unknown(fit: Fit) -> PartVerdict:
+    """The verdict that nothing explains what a fit leaves."""
+    return PartVerdict(Search(fit.data, fit, fit, ()), "unknown", 1.0, (), ())
 
 
 class Cases:

@@ -27,7 +27,7 @@ from diagnosis.report.records import PartOfGap
 from diagnosis.signals.noise_model import Source
 from models.registry import Array
 from report.gap import wording
-from tests.diagnosis.cases import STRONGEST, Cases, lab_a, lab_b, moved_by, white
+from tests.diagnosis.cases import STRONGEST, Cases, lab_a, lab_b, moved_by, unknown, white
 from tests.diagnosis.test_equivalents import DATA, NOISY
 
 GAP = np.sin(0.2 * np.arange(DATA.groups))[:, None]
@@ -314,7 +314,7 @@ def test_a_gap_that_a_nominal_parameter_took_upon_itself_lies_at_its_machine(cas
     names = [item.name for item in data.part.nuisances]
     for name, site in (("actuator.gain", "actuator"), ("column.stiffness", "column")):
         pinned = Fit(data, {}, TOLERANCES * np.eye(len(names))[names.index(name)], noise)
-        assert where.unexplained(data, pinned).site == site
+        assert where.unexplained(unknown(pinned)).site == site
 
 
 def test_an_effect_that_is_hardly_the_cause_stands_in_for_it() -> None:

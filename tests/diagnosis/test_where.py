@@ -21,7 +21,7 @@ from diagnosis.recorded.parts import Building, Part
 from diagnosis.recorded.record import NOT_LATE, Record
 from laboratories.effects import CATALOGUE, checked, lay
 from models.registry import Array
-from tests.diagnosis.cases import Cases, lab_a, lab_b, white
+from tests.diagnosis.cases import Cases, lab_a, lab_b, unknown, white
 
 PLAYERS = ("actuator", "column", "table", "damper", "link")
 WORTH = st.floats(-1e3, 1e3)
@@ -115,7 +115,7 @@ def test_an_unexplained_residual_is_attributed_to_the_site_of_the_signals_that_s
 ) -> None:
     kind, effects = SITES[site]
     data = spoilt(cases, kind, effects)
-    trace = where.unexplained(data, fitting.at(data, {}, np.zeros(len(data.part.nuisances))))
+    trace = where.unexplained(unknown(fitting.at(data, {}, np.zeros(len(data.part.nuisances)))))
     assert trace.site == site
     assert trace.ratio > 0.3
     assert trace.series.shape == (4000,)
@@ -152,4 +152,4 @@ def test_a_delay_of_a_logger_at_its_bound_is_no_site(cases: Cases) -> None:
         fit = fitting.at(data, {}, z)
         faint = replace(fit, reduced=np.zeros_like(fit.reduced))  # nothing is left to be seen
         assert pinned(faint) == (name,)
-        assert where.unexplained(data, faint).site in (("actuator",) if place == 0 else MACHINES)
+        assert where.unexplained(unknown(faint)).site in (("actuator",) if place == 0 else MACHINES)

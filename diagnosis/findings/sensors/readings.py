@@ -62,7 +62,7 @@ def read_by(record: Record) -> list[str]:
 def effect_on(record: Record, name: str, fault: str) -> str:
     """The effect of a fault on the reading of that name."""
     lab = next(lab for lab in record.labs if name in lab.measured)
-    return lab.site(f"sensor.{name.removeprefix(lab.ahead)}.{fault}")
+    return f"{lab.sensor(name)}.{fault}"
 
 
 def steps(record: Record) -> dict[str, float]:

@@ -1,0 +1,89 @@
+"""Noise of a reading that follows the motion of its part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.diagnose import diagnose
+from diagnosis.findings.sensors import uneven_noise
+from diagnosis.findings.verdict import judge
+from diagnosis.fits import residuals
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import search
+from diagnosis.fits.worth import SEEN
+from diagnosis.recorded.record import Record
+from models.registry import Array
+from tests.diagnosis.cases import Cases, lab_b
+
+TICKS = 6000
+SIZE = 0.6  # rms of an error over that of the noise: less than what is seen in averages
+
+
+def white(seed: int, count: int = TICKS) -> Array:
+    """Normal numbers of unit variance."""
+    return np.asarray(np.random.default_rng(seed).normal(size=count))
+
+
+def erring(whole: Record, name: str) -> Record:
+    """The record with a reading whose samples are taken early and late, by `SIZE` times its noise."""
+    read = whole.signals[name]
+    made = np.gradient(read) * white(11, read.size)
+    made *= SIZE * whole.planned_noise[name] / np.sqrt(np.mean(made**2))
+    return replace(whole, signals=whole.signals | {name: read + made})
+
+
+@pytest.mark.parametrize("name", ["damper_stroke", "column_displacement", "damper_force"])
+def test_noise_that_follows_the_motion_is_an_effect_of_its_reading(name: str, cases: Cases) -> None:
+    whole = erring(cases.record(duration=8.0), name)
+    found = diagnose({"slave": whole}, {})["slave"].report
+    assert (found.status, [place.site for place in found.where]) == ("unknown_effect", [f"sensor.{name}"])
+    assert found.which[0].effects == ()
+    assert any(one.startswith(f"The noise of {name} follows the motion") for one in found.warnings)
+    assert (found.where[0].residual_to_noise or 0.0) > SEEN
+    assert not found.details.learned
+
+
+def test_readings_of_which_something_is_known_are_left_aside(cases: Cases) -> None:
+    whole = erring(cases.record(duration=8.0), "damper_stroke")
+    verdict = judge(search(residuals.prepare(lab_b(whole), whole), Scales(whole)))
+    assert uneven_noise.own_error(verdict).outcome == "unknown"
+    assert uneven_noise.own_error(verdict, {"damper_stroke"}) is verdict
+
+
+def motion() -> Array:
+    """An input (ticks, 1) that grows and falls again."""
+    t = np.arange(TICKS) * 2e-3
+    return np.asarray(np.sin(2.0 * np.pi * t / 12.0) ** 4 * np.sin(2.0 * np.pi * 2.0 * t))[:, None]
+
+
+def judged(noise: Array, erring: Array) -> uneven_noise.Uneven:
+    """How much of a noise follows that input."""
+    rows = [uneven_noise.amplitudes(motion(), size) for size in uneven_noise.SCALES]
+    return uneven_noise.judged(noise, rows, erring)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_steady_noise_of_any_colour_follows_no_motion(seed: int) -> None:
+    normal = white(seed)
+    tails = np.random.default_rng(seed).standard_t(3.0, TICKS)
+    slow = np.convolve(normal, np.exp(-np.arange(400) / 60.0), "same") + 0.1 * white(seed + 100)
+    for noise in (normal, tails, slow):
+        assert judged(noise, np.zeros(TICKS)).significance < uneven_noise.SURE
+
+
+def test_a_gain_that_sways_shows_over_longer_means() -> None:
+    swaying = motion()[:, 0] * np.convolve(white(5), np.ones(20), "same")
+    found = judged(white(6) + 0.5 * swaying / swaying.std(), np.zeros(TICKS))
+    assert found.significance > uneven_noise.SURE
+    assert found.scale > uneven_noise.SCALES[0]
+
+
+def test_what_a_model_errs_by_does_not_count() -> None:
+    noise = white(3) * (1.0 + np.abs(motion()[:, 0]))
+    seen, none = (judged(noise, erring) for erring in (np.zeros(TICKS), 3.0 * white(4)))
+    assert min(seen.significance, none.significance) > uneven_noise.SURE
+    assert seen.ratio > 0.5
+    assert none.ratio == 0.0
