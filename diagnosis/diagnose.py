@@ -15,7 +15,7 @@ from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import filters, logger, report, where
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.sensors import jumps, outliers, readings, staircases, uneven_noise
+from diagnosis.findings.sensors import jumps, outliers, readings, staircases, swaying, uneven_noise
 from diagnosis.findings.sensors.loud_noise import no_noise
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.sensors.staircases import Stairs
@@ -167,7 +167,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
 
 def by_themselves(verdicts: Sequence[PartVerdict], aside: Collection[str]) -> list[PartVerdict]:
     """The verdicts with errors of single readings that nothing else shows; something is known of readings `aside`."""
-    found = map(jumps.own_error, map(outliers.own_error, verdicts))
+    found = map(swaying.own_error, map(jumps.own_error, map(outliers.own_error, verdicts)))
     return [uneven_noise.own_error(verdict, aside) for verdict in found]
 
 

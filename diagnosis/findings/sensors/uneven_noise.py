@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from diagnosis.findings.sites.signatures import laboratory_of
+from diagnosis.findings.sites.signatures import alone, laboratory_of
 from diagnosis.findings.verdict import WITHOUT_GAP, OwnError, PartVerdict
 from diagnosis.fits import hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
@@ -159,7 +159,7 @@ def own_error(verdict: PartVerdict, aside: Collection[str] = ()) -> PartVerdict:
     if not seen:
         return verdict
     name, most = max(seen.items(), key=lambda item: item[1].significance)
-    sites = (part.lab.sensor(name),) if len(seen) == 1 else ()
+    sites = alone(part, data.system, name) if len(seen) == 1 else ()
     text = (
         f"The noise of {name} follows the motion, as that of no effect of the catalogue does: a loose connector, a "
         "clock that jitters, a gain that sways or chatter of the machine may cause that."

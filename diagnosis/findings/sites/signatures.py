@@ -73,6 +73,18 @@ def signatures(part: LaboratoryPart, system: System, frequencies: Array) -> list
     return [*machines, *sensors]
 
 
+def alone(part: LaboratoryPart, system: System, name: str) -> tuple[str, ...]:
+    """The sites of what one reading alone shows: the machines that change no other one, then its sensor."""
+    place = part.signals.index(name)
+    columns = [(item.site, item.readings[0]) for item in signatures(part, system, np.ones(1))]
+    machines = [
+        site
+        for site, row in columns
+        if "sensor." not in site and row[place] != 0.0 and np.count_nonzero(row) == 1
+    ]
+    return (*machines, part.lab.sensor(name))
+
+
 def of_table(system: System, s: Spectrum) -> list[Way]:
     """A damper on a table: displacement and acceleration of the table, stroke and force of the damper."""
     damper, none, one = system.plan.damper, np.zeros_like(s), np.ones_like(s)
