@@ -19,7 +19,7 @@ from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, exchanged_pair
 from diagnosis.fits.trade import tied
-from diagnosis.fits.unexplained import MATERIAL, gaps, leaves, model_error
+from diagnosis.fits.unexplained import MATERIAL, foresees, gaps, leaves, model_error
 from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN
 from diagnosis.recorded.nuisances import LoggedReadings
 from diagnosis.recorded.parts import MODEL_ERROR
@@ -198,8 +198,9 @@ def unnamed(search: Search) -> PartVerdict:
 
 def without_effects(search: Search) -> Outcome:
     """The outcome where no effect is named: unknown, explained by the tolerances, or nothing above the noise."""
-    fit = search.chosen
-    if search.left > SEEN or leaves(fit, model_error(fit)) or pinned(fit):
+    fit, erring = search.chosen, model_error(search.chosen)
+    foreseen = small(search) and foresees(fit, erring)
+    if search.left > SEEN or leaves(fit, erring) or foreseen or pinned(fit):
         return "unknown"
     nominal = fitting.at(search.data, {}, np.zeros(fit.z.size))
     return "tolerances" if leaves(nominal) else "none"

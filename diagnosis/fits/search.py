@@ -15,7 +15,7 @@ from diagnosis.fits.laws.loop import of_one_loop, single, whole_loops
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
-from diagnosis.fits.unexplained import MATERIAL, leaves, model_error, remaining
+from diagnosis.fits.unexplained import MATERIAL, foresees, leaves, model_error, remaining
 
 MOST = 3  # effects of one part, the bias of a sensor aside: more of them can imitate any residual
 # Effects of one part that leave only noise, each of them needed for that; the share of what is left that each must
@@ -60,7 +60,8 @@ def search(data: Data, scales: Scales) -> Search:
     if found.chosen.names or data.part.exact or leaves(found.chosen, model_error(found.chosen)):
         return found
     fine = fitting.polished(settling.settled(fitting.fit(data.fine, {}, bare.z)))
-    return within(data.fine, fine, scales) if leaves(fine, model_error(fine)) else found
+    erring = model_error(fine)
+    return within(data.fine, fine, scales) if leaves(fine, erring) or foresees(fine, erring) else found
 
 
 def within(data: Data, bare: Fit, scales: Scales) -> Search:
