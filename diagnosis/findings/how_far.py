@@ -301,7 +301,9 @@ def all_traces(found: Diagnosis) -> list[SiteTrace]:
         result += where.traces(verdict.search.data, verdict.search.chosen)
         if verdict.outcome in UNNAMED:
             extra = where.unexplained(verdict)
-            if all(item.site != extra.site for item in result):  # a named site keeps the trace of its effects
+            # Beside a name that is doubted nothing may be left, and a named site keeps the trace of its effects.
+            seen = extra.ratio > 0.0 or not verdict.effects
+            if seen and all(item.site != extra.site for item in result):
                 result.append(extra)
     for reading in found.readings:
         site = found.record.catalogue[reading.effect].site

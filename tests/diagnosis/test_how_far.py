@@ -221,6 +221,17 @@ def test_a_named_site_keeps_its_trace_where_something_is_left_there(
     assert traces[0].ratio > 5.0
 
 
+@pytest.mark.parametrize(("ratio", "sites"), [(0.0, ["column"]), (0.4, ["column", "actuator"])])
+def test_nothing_that_is_left_beside_a_doubted_name_has_no_site(
+    ratio: float, sites: list[str], rubbing: Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    partly = [dataclasses.replace(item, outcome="partly") for item in rubbing.verdicts if item.effects]
+    left = SiteTrace("actuator", np.ones(3), ratio, "column_displacement", 1.0)
+    monkeypatch.setattr(where, "unexplained", lambda *_: left)
+    traces = how_far.all_traces(dataclasses.replace(rubbing, verdicts=partly))
+    assert [item.site for item in traces] == sites
+
+
 def test_an_unknown_effect_has_the_share_that_its_name_would_have(rubbing: Diagnosis) -> None:
     named = next(item for item in rubbing.verdicts if item.effects)
     search = named.search
