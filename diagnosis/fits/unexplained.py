@@ -13,6 +13,7 @@ import numpy as np
 from diagnosis.fits import sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.sensor_noise import Foreseen
+from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.signals.noise_model import NoiseModel
 from models.registry import Array
 
@@ -92,8 +93,11 @@ def leaves(fit: Fit, allowed: Array | None = None) -> bool:
 def foresees(fit: Fit, allowed: Array) -> bool:
     """Whether more of a residual follows from the inputs than is allowed in its signal (signals,), over σ.
 
-    So small a gap is found sooner by what causes it than by its energy, which must exceed that of the noise.
+    So small a gap is found sooner by what causes it than by its energy, which must exceed that of the noise. It
+    does not count in a building whose forces a logger recorded, as their delay is known to a part of an interval only.
     """
+    if isinstance(fit.data.part, LoggedBuilding):
+        return False
     least = np.maximum(FORESEEN, allowed)
     found = zip(sensor_noise.foreseen(fit), least, strict=True)
     return any(item.ratio > limit and item.significance > SIGNIFICANT for item, limit in found)
