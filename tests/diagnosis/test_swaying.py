@@ -16,7 +16,7 @@ from tests.diagnosis.cases import Cases, lab_a, lab_b
 
 COUNT, INTERVAL = 1500, 8e-3  # averaged samples, s
 SWAY = 1.7  # Hz
-SIZE = 0.5  # rms of the error over that of the noise
+SIZE = 0.35  # rms of the error over that of the noise
 
 
 def noise(seed: int) -> Array:
