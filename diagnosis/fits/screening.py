@@ -11,6 +11,7 @@ from scipy.optimize import lsq_linear
 
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import NEAR, Fit
+from diagnosis.fits.laws.specimen import within
 from diagnosis.fits.scales import FARTHEST, Scales
 from diagnosis.fits.threads import each
 from laboratories.effects.effect import Effect
@@ -98,7 +99,7 @@ def look(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect]:
         if form not in best or found[0].gain > best[form][0].gain:
             best[form] = found
     kept = [look_farther(*found, plane, scales) for found in best.values()]
-    return [*kept, *at_rest(effect, plane, scales)]
+    return [*kept, *at_rest(effect, plane, scales), *slightly_bent(effect, plane, scales)]
 
 
 def look_from(
@@ -131,4 +132,26 @@ def at_rest(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect
         moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: values}))
         gain, _, z = plane.gain((moved - fit.reduced).ravel(), UNSTRETCHED)
         found.append(ScreenedEffect(effect, values, z, gain))
+    return sorted(found, key=lambda item: -item.gain)[:1]
+
+
+def slightly_bent(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect]:
+    """For an effect that bends a reading near its level the most promising sharpness, where it does what is left.
+
+    Far below the level a reading x lacks x·(x/level)ⁿ/n, so that a fine sensor shows levels of many times what it
+    reaches, and no straight line leads there from usual ones.
+    """
+    levels = [item for item in effect.parameters if item.bends_by]
+    shapes = [item for item in effect.parameters for level in levels if item.name == level.bends_by]
+    if not shapes or not (sizes := scales.sizes(effect, levels[0])):
+        return []
+    fit, found = plane.fit, []
+    left = float(np.linalg.norm(fit.reduced))
+    for sharpness in shapes[0].sizes:
+        start = effect.values({levels[0].name: max(sizes), shapes[0].name: sharpness})
+        moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: start}))
+        farther = float(np.linalg.norm(moved - fit.reduced)) / left
+        if farther > 0.0:
+            start[levels[0].name] = within(levels[0], max(sizes) * farther ** (1.0 / sharpness))
+            found.append(look_from(effect, start, plane, scales)[0])
     return sorted(found, key=lambda item: -item.gain)[:1]

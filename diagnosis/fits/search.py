@@ -57,11 +57,16 @@ def search(data: Data, scales: Scales) -> Search:
     """
     bare = settling.settled(fitting.fit(data, {}))
     found = within(data, bare, scales)
-    if found.chosen.names or data.part.exact or leaves(found.chosen, model_error(found.chosen)):
+    if data.part.exact or leaves(found.chosen, model_error(found.chosen)) or tells(found, bare):
         return found
     fine = fitting.polished(settling.settled(fitting.fit(data.fine, {}, bare.z)))
     erring = model_error(fine)
     return within(data.fine, fine, scales) if leaves(fine, erring) or foresees(fine, erring) else found
+
+
+def tells(found: Search, bare: Fit) -> bool:
+    """Whether effects were found that tell enough: of a larger gap than good solutions differ by, or all of a gap."""
+    return bool(found.chosen.names) and (leaves(bare, model_error(bare)) or not worth.is_gap(found.chosen))
 
 
 def within(data: Data, bare: Fit, scales: Scales) -> Search:
