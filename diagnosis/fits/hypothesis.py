@@ -21,6 +21,7 @@ OF_SIZE = 0.1  # of such a step, in the distance of an effect's parameter from i
 # steps of 4 % ended twenty times as far from it (set "normal", seed 8101).
 OF_LOGARITHM = 0.025
 KEPT = 3  # residuals of the last places that are kept: a fit asks for those of a step and of the one before it again
+HIGHEST = 700.0  # logarithm of what a number can hold, nearly: a simplex steps beyond any range
 RENEWED = 3  # steps after which slopes over the effects' parameters are computed anew
 
 Values = dict[str, dict[str, float]]  # effect → parameter → value
@@ -52,7 +53,7 @@ class Free:
     def outward(self, place: float) -> float:
         """From the fit's value to the parameter's."""
         if self.logarithmic:
-            return math.exp(place)
+            return math.exp(min(place, HIGHEST))
         return self._origin + place * self.scale
 
     @property

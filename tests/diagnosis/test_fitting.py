@@ -273,3 +273,12 @@ def test_slopes_follow_the_residuals_of_a_step() -> None:
     assert found @ (p - before) == pytest.approx(new - old)
     assert np.array_equal(found[:, 1], slopes[:, 1])  # of a parameter that did not move
     assert secant(before, old, before, new, slopes) is slopes
+
+
+def test_a_step_beyond_all_numbers_ends_at_the_range_of_a_parameter(cases: Cases) -> None:
+    name = "sensor.column_force.saturation"
+    start = {name: CATALOGUE[name].values({"limit": 5e4, "sharpness": 2.0})}
+    problem = hypothesis.Problem(data_of(cases, "a", duration=2.0), start)
+    far = np.full(problem.place(start, np.zeros(problem.count)).size, 1e5)
+    limit, _ = CATALOGUE[name].parameters
+    assert problem.values(far)[name]["limit"] == limit.most
