@@ -10,7 +10,7 @@ import pytest
 from diagnosis.diagnose import diagnose
 from diagnosis.findings.sensors import outliers
 from diagnosis.findings.verdict import judge
-from diagnosis.fits import residuals
+from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
 from diagnosis.recorded.record import Record
@@ -53,6 +53,17 @@ def test_samples_that_several_readings_show_are_no_error_of_one(cases: Cases) ->
     whole = disturbed(cases.record(duration=8.0), 700.0, "damper_stroke", "damper_force")
     data = residuals.prepare(lab_b(whole), whole)
     assert outliers.found_in(judge(search(data, Scales(whole)))) == []
+
+
+def test_a_reading_without_noise_has_no_outliers(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    verdict = judge(search(residuals.prepare(lab_b(whole), whole), Scales(whole)))
+    data, fit = verdict.search.data, verdict.search.chosen
+    measured, white = lab_b(whole).measured.copy(), data.white.copy()
+    measured[:, 2] = data.part.predict(hypothesis.lay(data, fit.z, fit.values))[:, 2]
+    white[2] = 0.0
+    silent = replace(data, part=lab_b(whole).replaced(measured=measured), white=white)
+    assert outliers.found_in(replace(verdict, search=replace(verdict.search, data=silent))) == []
 
 
 @pytest.mark.parametrize("freedom", [3.0, 4.0, 30.0])

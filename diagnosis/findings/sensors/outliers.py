@@ -58,7 +58,8 @@ def found_in(verdict: PartVerdict) -> list[Outliers]:
         others = np.any([mask for k, mask in enumerate(spiky) if k != place], axis=0)
         own = spiky[place] & ~ndimage.binary_dilation(others, iterations=LONGEST)
         apart = beyond(x)
-        sizes = apart / np.maximum(deviation(apart), max(data.white[place], data.rounded[place]))
+        usual = np.maximum(deviation(apart), max(data.white[place], data.rounded[place]))
+        sizes = np.divide(apart, usual, where=usual > 0.0, out=np.zeros(apart.size))  # no noise, no spikes
         if (found := judged(own, sizes)) is not None:
             ticks, chance = found
             energy = math.sqrt(float(np.mean(np.square(np.where(own, sizes, 0.0)))))
