@@ -19,6 +19,7 @@ from diagnosis.findings.sensors import jumps, outliers, readings, staircases, sw
 from diagnosis.findings.sensors.loud_noise import no_noise
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.sensors.staircases import Stairs
+from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.findings.verdict import (
     UNNAMED,
     WITHOUT_GAP,
@@ -140,7 +141,8 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     verdicts, noisy = machines_first(record, verdicts, noisy)
     loud = noise(verdicts, heard)
     sensors = [*noisy, *staircases.findings(hidden, record, logged=late is not None)]
-    verdicts = by_themselves(verdicts, {*held, *(record.catalogue[item.effect].signal for item in sensors)})
+    aside = {*held, *(record.catalogue[item.effect].signal for item in sensors)}
+    verdicts = [by_itself(verdict, aside) for verdict in verdicts]
     result = Diagnosis(
         record,
         verdicts,
@@ -165,10 +167,21 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     return replace(result, warnings=[*result.warnings, *logger.remarks(result)])
 
 
-def by_themselves(verdicts: Sequence[PartVerdict], aside: Collection[str]) -> list[PartVerdict]:
-    """The verdicts with errors of single readings that nothing else shows; something is known of readings `aside`."""
-    found = map(swaying.own_error, map(jumps.own_error, map(outliers.own_error, verdicts)))
-    return [uneven_noise.own_error(verdict, aside) for verdict in found]
+def by_itself(verdict: PartVerdict, aside: Collection[str]) -> PartVerdict:
+    """The verdict on a laboratory without another gap, with an error of one reading by itself as an unknown effect.
+
+    Of readings `aside` something else is known.
+    """
+    part = laboratory_of(verdict.search.data.part)
+    if part is None or verdict.outcome not in WITHOUT_GAP:
+        return verdict
+    own = (
+        outliers.own_error(verdict, part)
+        or jumps.own_error(verdict, part)
+        or swaying.own_error(verdict, part)
+        or uneven_noise.own_error(verdict, part, aside)
+    )
+    return replace(verdict, outcome="unknown", own=own) if own else verdict
 
 
 def learnable(verdict: PartVerdict) -> bool:

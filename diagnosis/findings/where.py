@@ -121,9 +121,9 @@ def undecided(verdicts: Sequence[PartVerdict]) -> list[str]:
     """A sentence for each unknown effect that may lie at several sites."""
     found = [sites(item) for item in verdicts if item.outcome == "unknown"]
     return [
-        f"What no effect explains may arise at {' or at '.join(sites)}: these signals cannot tell them apart."
-        for sites in found
-        if len(sites) > 1
+        f"What no effect explains may arise at {' or at '.join(several)}: these signals cannot tell them apart."
+        for several in found
+        if len(several) > 1
     ]
 
 

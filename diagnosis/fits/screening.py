@@ -143,10 +143,10 @@ def slightly_bent(effect: Effect, plane: Plane, scales: Scales) -> list[Screened
     """
     levels = [item for item in effect.parameters if item.bends_by]
     shapes = [item for item in effect.parameters for level in levels if item.name == level.bends_by]
-    if not shapes or not (sizes := scales.sizes(effect, levels[0])):
-        return []
     fit, found = plane.fit, []
     left = float(np.linalg.norm(fit.reduced))
+    if not shapes or not left or not (sizes := scales.sizes(effect, levels[0])):
+        return []
     for sharpness in shapes[0].sizes:
         start = effect.values({levels[0].name: max(sizes), shapes[0].name: sharpness})
         moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: start}))

@@ -222,7 +222,7 @@ def test_a_named_site_keeps_its_trace_where_something_is_left_there(
 
 
 @pytest.mark.parametrize(("ratio", "sites"), [(0.0, ["column"]), (0.4, ["column", "actuator"])])
-def test_nothing_that_is_left_beside_a_doubted_name_has_no_site(
+def test_where_nothing_is_left_beside_a_doubted_name_no_other_site_is_blamed(
     ratio: float, sites: list[str], rubbing: Diagnosis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     partly = [dataclasses.replace(item, outcome="partly") for item in rubbing.verdicts if item.effects]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.diagnose import diagnose
+from diagnosis.diagnose import by_itself, diagnose
 from diagnosis.findings.sensors import uneven_noise
 from diagnosis.findings.verdict import judge
 from diagnosis.fits import residuals
@@ -48,9 +48,11 @@ def test_noise_that_follows_the_motion_is_an_effect_of_its_reading(name: str, ca
 
 def test_readings_of_which_something_is_known_are_left_aside(cases: Cases) -> None:
     whole = erring(cases.record(duration=8.0), "damper_stroke")
-    verdict = judge(search(residuals.prepare(lab_b(whole), whole), Scales(whole)))
-    assert uneven_noise.own_error(verdict).outcome == "unknown"
-    assert uneven_noise.own_error(verdict, {"damper_stroke"}) is verdict
+    part = lab_b(whole)
+    verdict = judge(search(residuals.prepare(part, whole), Scales(whole)))
+    assert by_itself(verdict, ()).outcome == "unknown"
+    assert uneven_noise.own_error(verdict, part) is not None
+    assert uneven_noise.own_error(verdict, part, {"damper_stroke"}) is None
 
 
 def motion() -> Array:

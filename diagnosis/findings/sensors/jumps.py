@@ -8,7 +8,6 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +15,11 @@ from scipy import fft
 
 from diagnosis.findings.sensors.uneven_noise import ROUNDED
 from diagnosis.findings.sites.likely import APART
-from diagnosis.findings.sites.signatures import laboratory_of
-from diagnosis.findings.verdict import WITHOUT_GAP, OwnError, PartVerdict
+from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis
 from diagnosis.fits.residuals import Data, filled
 from diagnosis.fits.worth import SEEN
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals import colour
 from models.registry import Array
 
@@ -44,14 +43,15 @@ class Jumps(NamedTuple):
 def found_in(noise: Array) -> Jumps:
     """The level that jumps about which noise (n,) is most likely white, with what speaks for it."""
     apart = noise - noise.mean()
-    count, each = apart.size, 2.0  # numbers that each jump takes: when, and by how much
+    count = apart.size
     places: list[int] = []
     best = Jumps((), np.zeros(count), 0.0, -math.inf)
     for place in [0, *splits(apart)]:
         places = sorted({*places, place} - {0})
         level = levels(apart, places)
         variance = float(np.mean(np.square(apart - level)))
-        nats = -0.5 * count * math.log(max(variance, 1e-300)) - 0.5 * each * len(places) * math.log(count)
+        # each jump takes two numbers, of which Schwarz's criterion charges half the logarithm of the count
+        nats = -0.5 * count * math.log(max(variance, 1e-300)) - len(places) * math.log(count)
         if nats > best.nats:
             best = Jumps(tuple(places), level, math.sqrt(variance), nats)
     return best._replace(nats=best.nats - steady(apart))
@@ -110,29 +110,23 @@ def steady(noise: Array) -> float:
     return -0.5 * min(costs)
 
 
-def own_error(verdict: PartVerdict) -> PartVerdict:
-    """The verdict on a laboratory that has no other gap, with a zero that jumps as an effect of its reading.
-
-    What several readings show is a motion.
-    """
+def own_error(verdict: PartVerdict, part: LaboratoryPart) -> OwnError | None:
+    """The jumps of the zero of one reading; what several readings show is a motion."""
     data = verdict.search.data
-    part = laboratory_of(data.part)
-    if part is None or verdict.outcome not in WITHOUT_GAP:
-        return verdict
     found = {place: jumping(verdict, place) for place in range(len(data.part.signals)) if slow(data, place)}
     seen = {place: one for place, one in found.items() if one.places and one.nats > APART}
     if len(seen) != 1:
-        return verdict
+        return None
     ((place, one),) = seen.items()
     name = data.part.signals[place]
     ratio = float(one.level.std()) / max(math.sqrt(data.group) * one.white, 1e-300)
     if ratio < SEEN:
-        return verdict
+        return None
     times = ", ".join(f"{data.group * tick * data.system.plan.test.interval:.2f}" for tick in one.places)
     text = (
         f"The zero of {name} jumps at {times} s, which no noise does: counts or contact may have been lost."
     )
-    return replace(verdict, outcome="unknown", own=OwnError(name, ratio, (part.lab.sensor(name),), text))
+    return OwnError(name, ratio, (part.lab.sensor(name),), text)
 
 
 def slow(data: Data, place: int) -> bool:

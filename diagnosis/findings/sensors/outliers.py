@@ -15,10 +15,11 @@ import numpy as np
 from scipy import ndimage, stats
 
 from diagnosis.findings.sites.signatures import laboratory_of
-from diagnosis.findings.verdict import UNNAMED, WITHOUT_GAP, OwnError, PartVerdict
+from diagnosis.findings.verdict import UNNAMED, OwnError, PartVerdict
 from diagnosis.fits import hypothesis
 from diagnosis.fits.residuals import filled
 from diagnosis.fits.worth import SEEN
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.spikes import BEYOND, LONGEST, beyond, deviation, spikes
 from models.registry import Array
@@ -37,7 +38,7 @@ class Outliers(NamedTuple):
     """Samples of one reading that its noise does not make."""
 
     signal: str
-    times: tuple[float, ...]  # s, of the first sample of each
+    times: tuple[float, ...]  # s, of the largest sample of each
     largest: float  # in deviations of the noise
     ratio: float  # rms over the whole record, in deviations of the noise
     chance: float  # probability that the tails of noise make as many as large ones
@@ -92,28 +93,22 @@ def judged(spiky: Mask, sizes: Array) -> tuple[Array, float] | None:
 
 def sentence(one: Outliers) -> str:
     """What a report says of outliers."""
-    times = ", ".join(f"{time:.3f}" for time in one.times[:LISTED]) + (
-        " …" if len(one.times) > LISTED else ""
-    )
-    many = len(one.times) > 1
+    times = ", ".join(f"{time:.3f}" for time in one.times[:LISTED])
+    times += " …" if len(one.times) > LISTED else ""
+    count = f"{len(one.times)} samples" if len(one.times) > 1 else "1 sample"
     return (
-        f"{one.signal} has {len(one.times) if many else 'a'} sample{'s' if many else ''} far beyond its noise, up to "
-        f"{one.largest:.0f} times as far, at {times} s. {'They are' if many else 'It is'} left out of all fits: read "
-        "from elsewhere, or disturbed."
+        f"{one.signal} has {count} far beyond its noise, at {times} s, by up to {one.largest:.0f} times its standard "
+        "deviation. All fits leave them out: they may have been read from elsewhere, or disturbed."
     )
 
 
-def own_error(verdict: PartVerdict) -> PartVerdict:
-    """The verdict on a part that has no other gap, with the outliers of its reading that has the most as an effect."""
-    part = laboratory_of(verdict.search.data.part)
-    if part is None or verdict.outcome not in WITHOUT_GAP:
-        return verdict
+def own_error(verdict: PartVerdict, part: LaboratoryPart) -> OwnError | None:
+    """The outliers of the reading that has the most, where they are too large and too many for chance."""
     seen = [one for one in found_in(verdict) if one.chance < SURE and one.ratio > SEEN]
     if not seen:
-        return verdict
+        return None
     most = max(seen, key=lambda one: one.ratio)
-    own = OwnError(most.signal, most.ratio, (part.lab.sensor(most.signal),))
-    return replace(verdict, outcome="unknown", own=own)
+    return OwnError(most.signal, most.ratio, (part.lab.sensor(most.signal),))
 
 
 def told(verdicts: Sequence[PartVerdict]) -> list[str]:

@@ -93,19 +93,19 @@ def staircase(predicted: Array, residual: Array) -> Stairs | None:
     count = min(TRIED, 16 + math.ceil(math.log(MOST / LEAST) * reach / (LEAST * usual * APART)))
     steps = usual * np.geomspace(LEAST, MOST, count)
     steps = steps[steps < COARSEST * reach]
-    left = remaining(predicted, residual, steps)
+    left = variances(predicted, residual, steps)
     best = int(np.argmin(left)) if steps.size else 0
     if not steps.size or left[best] > (1.0 - SHARE) * np.var(residual):
         return None
     near = np.linspace(steps[max(best - 1, 0)], steps[min(best + 1, steps.size - 1)], count)
-    left = remaining(predicted, residual, near)
+    left = variances(predicted, residual, near)
     step = float(near[np.argmin(left)])
     # the place of the outermost level is known as well as the reading there
     half = step * math.sqrt(float(np.min(left))) / reach + float(near[1] - near[0])
     return Stairs(step, step - half, step + half)
 
 
-def remaining(predicted: Array, residual: Array, steps: Array) -> Array:
+def variances(predicted: Array, residual: Array, steps: Array) -> Array:
     """Variance of a residual (ticks,) once the rounding of a reading (ticks,) to each step is taken away, (steps,)."""
     several = max(1, AT_ONCE // predicted.size)
     parts = np.array_split(steps, math.ceil(steps.size / several)) if steps.size else []

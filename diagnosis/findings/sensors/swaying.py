@@ -8,18 +8,17 @@ at once: times the motion such an error is a wave, of which a periodogram shows 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from diagnosis.findings.sensors.uneven_noise import ROUNDED
-from diagnosis.findings.sites.signatures import alone, laboratory_of
-from diagnosis.findings.verdict import WITHOUT_GAP, OwnError, PartVerdict
+from diagnosis.findings.sites.signatures import alone
+from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.unexplained import BOTH, MATERIAL
-from diagnosis.recorded.parts import FINE_ERROR
+from diagnosis.recorded.parts import FINE_ERROR, LaboratoryPart
 from models.registry import Array
 
 # Nats of a line beyond what noise has, from which on it counts, and from which on another reading may show it as well.
@@ -72,12 +71,9 @@ def line(left: Array, motion: Array, interval: float) -> Sway:
     return Sway(float(nats[best]), rms, (best + FINER) / (lines * interval))
 
 
-def own_error(verdict: PartVerdict) -> PartVerdict:
-    """The verdict on a laboratory without another gap, with a share of the motion that changes in time as an effect."""
+def own_error(verdict: PartVerdict, part: LaboratoryPart) -> OwnError | None:
+    """The share of the motion that changes in time of the reading that shows it most."""
     data = verdict.search.data
-    part = laboratory_of(data.part)
-    if part is None or verdict.outcome not in WITHOUT_GAP:
-        return verdict
     found = sways(verdict.search.chosen)
     least = np.maximum(MATERIAL, BOTH * FINE_ERROR * data.part.level / data.sigma)
     smooth = data.rounded <= ROUNDED * data.white
@@ -87,7 +83,7 @@ def own_error(verdict: PartVerdict) -> PartVerdict:
         if smooth[place] and one.nats > SURE and one.ratio > least[place]
     ]
     if not seen:
-        return verdict
+        return None
     place = max(seen, key=lambda place: found[place].nats)
     name, most = data.part.signals[place], found[place]
     text = (
@@ -96,4 +92,4 @@ def own_error(verdict: PartVerdict) -> PartVerdict:
     )
     lone = sum(one.nats > MAYBE for one in found) == 1
     sites = alone(part, data.system, name) if lone else ()
-    return replace(verdict, outcome="unknown", own=OwnError(name, most.ratio, sites, text))
+    return OwnError(name, most.ratio, sites, text)

@@ -11,18 +11,18 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy import signal
 
-from diagnosis.findings.sites.signatures import alone, laboratory_of
-from diagnosis.findings.verdict import WITHOUT_GAP, OwnError, PartVerdict
+from diagnosis.findings.sites.signatures import alone
+from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.unexplained import BOTH
 from diagnosis.fits.worth import SEEN
+from diagnosis.recorded.parts import LaboratoryPart
 from models.registry import Array
 
 SCALES = (1, 2, 4, 8, 16, 32)  # ticks of the means that are held against each other
@@ -142,26 +142,20 @@ def correlations(values: Array, reach: int) -> Array:
     return np.asarray(whole[1:] / max(float(whole[0]), 1e-300))
 
 
-def own_error(verdict: PartVerdict, aside: Collection[str] = ()) -> PartVerdict:
-    """The verdict on a laboratory that has no other gap, with noise that follows the motion as an effect.
-
-    Something else is known of readings `aside`.
-    """
+def own_error(verdict: PartVerdict, part: LaboratoryPart, aside: Collection[str] = ()) -> OwnError | None:
+    """The noise that follows the motion most; something else is known of readings `aside`."""
     data = verdict.search.data
-    part = laboratory_of(data.part)
-    if part is None or verdict.outcome not in WITHOUT_GAP:
-        return verdict
     seen = {
         name: one
         for name, one in zip(data.part.signals, uneven(verdict.search.chosen), strict=True)
         if one.significance > SURE and one.ratio > SEEN and name not in aside
     }
     if not seen:
-        return verdict
+        return None
     name, most = max(seen.items(), key=lambda item: item[1].significance)
     sites = alone(part, data.system, name) if len(seen) == 1 else ()
     text = (
         f"The noise of {name} follows the motion, as that of no effect of the catalogue does: a loose connector, a "
         "clock that jitters, a gain that sways or chatter of the machine may cause that."
     )
-    return replace(verdict, outcome="unknown", own=OwnError(name, most.ratio, sites, text))
+    return OwnError(name, most.ratio, sites, text)
