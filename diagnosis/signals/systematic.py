@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import fft, ndimage
+from scipy import fft, ndimage, signal
 
 from models.indicators.checks import checked
 from models.registry import Array
@@ -74,3 +74,9 @@ def systematic_rms(residual: Array, noise_rms: float, low: float = LOW) -> Syste
     if error == 0.0:
         return Systematic(rms, math.inf if energy > 0.0 else 0.0)
     return Systematic(rms, excess / error)
+
+
+def correlations(values: Array, reach: int) -> Array:
+    """Correlation of a series (n,) with itself at lags from one to `reach`."""
+    whole = signal.correlate(values, values, method="fft")[values.size - 1 : values.size + reach]
+    return np.asarray(whole[1:] / max(float(whole[0]), 1e-300))

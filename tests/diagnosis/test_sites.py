@@ -96,12 +96,70 @@ def test_what_the_mass_of_a_damper_carries_along_lies_at_the_damper(cases: Cases
     assert likely_sites(judged(part, data, part.predict(heavier)))[0] == "damper"
 
 
-def test_a_column_and_the_load_cell_behind_it_cannot_be_told_apart(cases: Cases) -> None:
+def bent_by(values: Array, share: float) -> Array:
+    """A small value of the square of others, which is that share of the largest."""
+    return share * np.max(np.abs(values)) * (values / np.max(np.abs(values))) ** 2
+
+
+def test_a_wire_that_is_not_along_the_stroke_lies_at_its_sensor(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_b(whole)
+    data = residuals.prepare(part, whole)
+    truth = part.predict(data.system)
+    stroke = part.signals.index("damper_stroke")
+    truth[:, stroke] += bent_by(truth[:, stroke], 4e-4)
+    assert likely_sites(judged(part, data, truth)) == ("sensor.damper_stroke",)
+
+
+def test_a_force_that_depends_on_the_stroke_lies_at_the_damper(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_b(whole)
+    data = residuals.prepare(part, whole)
+    truth = part.predict(data.system)
+    stroke = part.signals.index("damper_stroke")
+    damper = data.system.plan.damper
+    force = damper.stiffness * bent_by(truth[:, stroke], 2e-2)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(2 * force.size, 2e-3)
+    moving = damper.stiffness + 1j * omega * damper.damping - omega**2 * damper.mass
+    truth[:, stroke] += np.fft.irfft(np.fft.rfft(force, 2 * force.size) / moving)[: force.size]
+    assert likely_sites(judged(part, data, truth)) == ("damper",)
+
+
+def test_a_scale_that_bends_lies_at_the_load_cell_and_not_at_the_column_before_it(cases: Cases) -> None:
     whole = cases.record(duration=SECONDS)
     part = lab_a(whole)
     data = residuals.prepare(part, whole)
     truth = part.predict(data.system)
     truth[:, 1] = softer(truth[:, 1])
+    assert likely_sites(judged(part, data, truth)) == ("sensor.column_force",)
+
+
+def test_a_force_that_depends_on_the_speed_lies_at_the_column(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_a(whole)
+    data = residuals.prepare(part, whole)
+    truth = part.predict(data.system)
+    truth[:, 1] += 1e-2 * np.std(truth[:, 1]) * np.tanh(np.gradient(truth[:, 0], 2e-3) / 5e-3)
+    assert likely_sites(judged(part, data, truth)) == ("column",)
+
+
+def test_a_zero_that_drifts_lies_at_the_load_cell(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_a(whole)
+    data = residuals.prepare(part, whole)
+    truth = part.predict(data.system)
+    truth[:, 1] += 0.5 * data.white[1] * np.sin(np.linspace(0.0, np.pi, len(truth)))
+    assert likely_sites(judged(part, data, truth))[0] == "sensor.column_force"
+
+
+def test_a_column_and_the_load_cell_behind_it_cannot_be_told_apart_by_what_follows_neither(
+    cases: Cases,
+) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_a(whole)
+    data = residuals.prepare(part, whole)
+    truth = part.predict(data.system)
+    truth[:, 1] += 3.0 * data.white[1] * ripple(np.zeros(len(truth))) / 2e-4
     fit = judged(part, data, truth)
     assert likely_sites(fit) == ("column", "sensor.column_force")
     verdict = judge(Search(data, fit, fit, ()))

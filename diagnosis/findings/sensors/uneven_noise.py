@@ -14,7 +14,6 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from diagnosis.findings.sites.signatures import alone
 from diagnosis.findings.verdict import OwnError, PartVerdict
@@ -23,6 +22,7 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.unexplained import BOTH
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.signals.systematic import correlations
 from models.registry import Array
 
 SCALES = (1, 2, 4, 8, 16, 32)  # ticks of the means that are held against each other
@@ -134,12 +134,6 @@ def standard(values: Array) -> Array:
     """Values (n, …) with mean zero and rms one along the first axis; zero where they do not change."""
     apart = values - values.mean(axis=0)
     return np.asarray(apart / np.maximum(apart.std(axis=0), 1e-300))
-
-
-def correlations(values: Array, reach: int) -> Array:
-    """Correlation of a series (n,) with itself at lags from one to `reach`."""
-    whole = signal.correlate(values, values, method="fft")[values.size - 1 : values.size + reach]
-    return np.asarray(whole[1:] / max(float(whole[0]), 1e-300))
 
 
 def own_error(verdict: PartVerdict, part: LaboratoryPart, aside: Collection[str] = ()) -> OwnError | None:

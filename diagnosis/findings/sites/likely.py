@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.findings.sensors.common_noise import in_common
+from diagnosis.findings.sites import functions
 from diagnosis.findings.sites.signatures import Signature, Spectrum, laboratory_of, signatures
 from diagnosis.fits import fitting, hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
@@ -25,6 +26,7 @@ ERRING = 0.05
 # Nats by which sites differ that can be told apart. Of 24 unknown effects outside this repository the true site led by
 # more than 60 nats wherever any reading differs; of noise the differences scatter by 3 to 5.
 APART = 15.0
+SCATTER = 5.0  # the largest of these
 # Nats that speak against a rare cause from the start, so that by the same trial it counts only where a reading differs.
 RARE = 60.0
 # A stand-in rarely explains more than 0.94 of a gap's energy, the true mechanism under another law rarely less: on the
@@ -56,9 +58,29 @@ class Spectra(NamedTuple):
 
 
 def likely_sites(fit: Fit) -> tuple[str, ...]:
-    """The sites that the residuals of a fit cannot tell apart, the machines first; none where no signature is known."""
-    near = [item for item in ranked(fit) if item.cost < APART]
-    return tuple(dict.fromkeys(item.site for item in sorted(near, key=lambda item: "sensor." in item.site)))
+    """The sites that the residuals of a fit cannot tell apart; none where no signature is known.
+
+    The machines come first, unless the residuals are likelier functions of what a sensor reads than forces at one. At a
+    machine of which an effect is named that is not asked: what is left is its law's.
+    """
+    near = [item.site for item in ranked(fit) if item.cost < APART]
+    order = sorted(near, key=lambda site: "sensor." in site)
+    part = laboratory_of(fit.data.part)
+    if part is None:
+        return tuple(order)
+    explained = {fit.data.catalogue[name].site for name in fit.names}
+    leads = {
+        (sensor, machine): functions.lead(fit, part, sensor, machine)
+        for sensor in order
+        for machine in order
+        if "sensor." in sensor and "sensor." not in machine and machine not in explained
+    }
+    beaten = {
+        machine if nats > 0.0 else sensor for (sensor, machine), nats in leads.items() if abs(nats) > APART
+    }
+    first = {sensor for (sensor, _), nats in leads.items() if nats > SCATTER}
+    order.sort(key=lambda site: site not in first)
+    return tuple(site for site in order if site not in beaten)
 
 
 def ranked(fit: Fit) -> list[LikelySite]:

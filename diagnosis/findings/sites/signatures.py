@@ -7,6 +7,9 @@ Table:    x, s²·x, y = −m·s²·x/(m·s² + c·s + k), force (k + c·s)·y; 
           x, which is measured from there
 Damper:   y, force −m·s²·y by a force within the damper, (k + c·s)·y by what its mass carries along
 Actuator: x, force (m·s² + c·s + k)·x;  column: force alone
+
+A force that depends on the damper's stroke moves its mass by 1/(m·s² + c·s + k); one that depends on the column's
+displacement is read as it is.
 """
 
 from __future__ import annotations
@@ -25,6 +28,10 @@ from models.registry import Array
 from models.system import System
 
 Spectrum = NDArray[np.complex128]
+STROKE, DISPLACEMENT = (
+    2,
+    0,
+)  # places of the damper's stroke and of the column's displacement among the readings
 
 
 class Signature(NamedTuple):
@@ -33,6 +40,8 @@ class Signature(NamedTuple):
     site: str
     readings: Spectrum  # (frequencies, signals)
     rare: bool = False  # whether another site that explains as much is the likelier one
+    motion: int | None = None  # place of the reading of the motion on which a force at the site depends
+    receptance: Spectrum | None = None  # (frequencies,) of the series over that force
 
 
 class Way(NamedTuple):
@@ -41,6 +50,8 @@ class Way(NamedTuple):
     site: str
     rows: list[Spectrum]  # by signal
     rare: bool = False
+    motion: int | None = None
+    receptance: Spectrum | None = None
 
 
 def laboratory_of(part: Part) -> LaboratoryPart | None:
@@ -62,7 +73,9 @@ def signatures(part: LaboratoryPart, system: System, frequencies: Array) -> list
     s: Spectrum = np.asarray(2j * np.pi * frequencies, dtype=np.complex128)
     recorded = passed(part, frequencies)
     machines = [
-        Signature(lab.site(way.site), np.stack(way.rows, axis=1) * recorded, way.rare)
+        Signature(
+            lab.site(way.site), np.stack(way.rows, axis=1) * recorded, way.rare, way.motion, way.receptance
+        )
         for way in find(system, s)
     ]
     one = np.eye(recorded.shape[1])
@@ -91,11 +104,12 @@ def of_table(system: System, s: Spectrum) -> list[Way]:
     inertia = damper.mass * s**2
     spring = damper.stiffness + damper.damping * s
     moving = inertia + spring
+    yields = np.divide(one, moving, out=np.zeros_like(s), where=moving != 0.0)
     return [
         Way("table", [moving, s**2 * moving, -inertia, -inertia * spring]),
         Way("table", [none, s**2 * moving, -inertia, -inertia * spring], rare=True),
-        Way("damper", [none, none, one, -inertia]),
-        Way("damper", [none, none, one, spring]),
+        Way("damper", [none, none, one, -inertia], motion=STROKE, receptance=yields),
+        Way("damper", [none, none, one, spring], motion=STROKE, receptance=yields),
     ]
 
 
@@ -104,7 +118,7 @@ def of_column(system: System, s: Spectrum) -> list[Way]:
     column, one = system.plan.column, np.ones_like(s)
     return [
         Way("actuator", [one, column.mass * s**2 + column.damping * s + column.stiffness]),
-        Way("column", [0.0 * one, one]),
+        Way("column", [0.0 * one, one], motion=DISPLACEMENT, receptance=one),
     ]
 
 
