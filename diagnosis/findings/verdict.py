@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.findings.sensors.one_motion import one_motion, one_place
-from diagnosis.findings.sensors.own_reading import errors, machine_alone
+from diagnosis.findings.sensors.own_reading import errors, gives_energy, machine_alone
 from diagnosis.findings.sensors.slow_noise import under_less_noise
 from diagnosis.findings.sites.likely import APART, REST, ranked
 from diagnosis.findings.sites.signatures import laboratory_of
@@ -124,9 +124,11 @@ def other_cause(search: Search) -> bool:
 
     It is another part of a loop of which several values are named, another place of a machine in the place of offsets,
     or another law of a machine of which a reading is named as well that shows nothing else: both are one function of
-    the same motion. A small gap may have any cause.
+    the same motion, as are a column that gives energy and a load cell with hysteresis. A small gap may have any cause.
     """
-    return bool(loop_of_several(search) or one_place(search) or errors(search.chosen) or small(search))
+    fit = search.chosen
+    machine = loop_of_several(search) or one_place(search)
+    return bool(machine or errors(fit) or gives_energy(fit) or small(search))
 
 
 def loop_of_several(search: Search) -> str:

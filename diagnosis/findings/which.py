@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.findings.certainty import trust
 from diagnosis.findings.certainty.intervals import Interval, intervals
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.sensors.own_reading import errors
+from diagnosis.findings.sensors.own_reading import errors, gives_energy
 from diagnosis.findings.verdict import EITHER, PartVerdict, loop_of_several, small
 from diagnosis.fits.fitting import Fit, without_rest
 from diagnosis.fits.trade import tied
@@ -117,6 +117,11 @@ def other_causes(verdict: PartVerdict) -> list[str]:
         return [
             f"What {described(verdict.search.chosen)} explains is so small that two good solutions of one model may "
             "differ by it. Something else as small may look the same."
+        ]
+    if name := gives_energy(verdict.search.chosen):
+        return [
+            f"With {name} the column gives more energy than it ever took, since its force falls later than it rises. "
+            "Hysteresis of its load cell looks the same: these signals cannot tell them apart."
         ]
     loop = loop_of_several(verdict.search)
     if not loop:

@@ -11,6 +11,7 @@ import pytest
 from diagnosis.findings import where
 from diagnosis.findings.sites.likely import likely_sites, ranked
 from diagnosis.findings.verdict import judge, misplaced
+from diagnosis.findings.which import other_causes
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
@@ -187,3 +188,16 @@ def test_a_building_has_no_likely_sites(cases: Cases) -> None:
     fit = fitting.at(data, {}, np.zeros(len(data.part.nuisances)))
     assert ranked(fit) == []
     assert where.culprits(fit) == ("structure",)
+
+
+@pytest.mark.parametrize(("law", "gives"), [(2.0, True), (0.0, False), (1.0, False)])
+def test_a_column_that_gives_energy_may_be_a_load_cell_with_hysteresis(
+    cases: Cases, law: float, gives: bool
+) -> None:
+    effects = {"column.slip": {"gap": 1e-4, "law": law}}
+    whole = cases.record(effects, duration=8.0)
+    data = residuals.prepare(lab_a(whole), whole)
+    found = judge(Search(data, fitting.fit(data, {}), fitting.fit(data, effects), ()))
+    assert found.effects == ("column.slip",)
+    assert (found.probability < 0.5) == gives
+    assert ["Hysteresis of its load cell" in text for text in other_causes(found)] == [True] * gives
