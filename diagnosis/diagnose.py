@@ -29,11 +29,13 @@ from diagnosis.findings.verdict import (
     pickup,
     seen_in,
     sharpest,
+    small,
 )
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
+from diagnosis.fits.unexplained import remaining
 from diagnosis.learned.learn import learn
 from diagnosis.recorded.divided import BUILDING, driven, parts_of, used
 from diagnosis.recorded.ground import Ground
@@ -168,12 +170,16 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
 
 
 def by_itself(verdict: PartVerdict, aside: Collection[str]) -> PartVerdict:
-    """The verdict on a laboratory without another gap, with an error of one reading by itself as an unknown effect.
+    """The verdict on a laboratory without a larger gap, with an error of one reading by itself as an unknown effect.
 
-    Of readings `aside` something else is known.
+    Such an error moves nominal parameters a little, so that small gaps of other readings may follow from it. Of
+    readings `aside` something else is known.
     """
-    part = laboratory_of(verdict.search.data.part)
-    if part is None or verdict.outcome not in WITHOUT_GAP:
+    part, search = laboratory_of(verdict.search.data.part), verdict.search
+    if part is not None and verdict.outcome == "explained":
+        return uneven_noise.doubting(verdict, part, aside)
+    slight = verdict.outcome == "unknown" and not verdict.effects and small(search)
+    if part is None or not (slight or verdict.outcome in WITHOUT_GAP):
         return verdict
     own = (
         outliers.own_error(verdict, part)
@@ -181,7 +187,9 @@ def by_itself(verdict: PartVerdict, aside: Collection[str]) -> PartVerdict:
         or swaying.own_error(verdict, part)
         or uneven_noise.own_error(verdict, part, aside)
     )
-    return replace(verdict, outcome="unknown", own=own) if own else verdict
+    if own is None or (slight and own.ratio < remaining(search.chosen)):
+        return verdict
+    return replace(verdict, outcome="unknown", own=own)
 
 
 def learnable(verdict: PartVerdict) -> bool:

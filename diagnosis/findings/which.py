@@ -75,7 +75,11 @@ def trusted(
     shares = [trust.share_named(item.search.explained) for item in left]
     probability = trust.less_by_freedom(min(near, trust.PARTLY.probability(signs), *shares), left)
     doubtful = any(
-        trust.of_the_plan(item) or without_rest(item.search.chosen) or small(item.search) for item in left
+        trust.of_the_plan(item)
+        or without_rest(item.search.chosen)
+        or small(item.search)
+        or item.own is not None
+        for item in left
     )
     return EITHER * probability if doubtful else probability
 

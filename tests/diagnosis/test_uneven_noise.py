@@ -46,6 +46,22 @@ def test_noise_that_follows_the_motion_is_an_effect_of_its_reading(name: str, ca
     assert not found.details.learned
 
 
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_a_clock_that_is_early_by_chance_is_no_delay_and_no_effect_of_the_table(
+    share: float, cases: Cases
+) -> None:
+    whole = cases.record(duration=12.0)
+    read = whole.signals["table_displacement"]
+    early = share * np.random.default_rng(5).random(read.size)
+    made = read - early * np.diff(read, prepend=read[0])
+    jittering = replace(whole, signals=whole.signals | {"table_displacement": made})
+    found = diagnose({"slave": jittering}, {})["slave"].report
+    assert found.status in ("unknown_effect", "partly_explained")
+    assert found.where[0].site == "sensor.table_displacement"
+    assert not found.which[0].effects or (found.which[0].probability or 0.0) < 0.5
+    assert any(one.startswith("The noise of table_displacement follows") for one in found.warnings)
+
+
 def test_readings_of_which_something_is_known_are_left_aside(cases: Cases) -> None:
     whole = erring(cases.record(duration=8.0), "damper_stroke")
     part = lab_b(whole)

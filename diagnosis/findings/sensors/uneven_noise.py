@@ -11,12 +11,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from diagnosis.findings.sites.signatures import alone
-from diagnosis.findings.verdict import OwnError, PartVerdict
+from diagnosis.findings.verdict import EITHER, OwnError, PartVerdict
 from diagnosis.fits import hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.unexplained import BOTH
@@ -34,6 +35,7 @@ OUTERMOST = 3.0
 SURE = 6.0
 # Steps over the noise from which on the error of rounding, which depends on the motion, shows.
 ROUNDED = 0.5
+MEANS = ("delay", "lag", "gain")  # of readings: what an error by chance that follows the motion is on average
 
 
 class Uneven(NamedTuple):
@@ -153,3 +155,19 @@ def own_error(verdict: PartVerdict, part: LaboratoryPart, aside: Collection[str]
         "clock that jitters, a gain that sways or chatter of the machine may cause that."
     )
     return OwnError(name, most.ratio, sites, text)
+
+
+def doubting(verdict: PartVerdict, part: LaboratoryPart, aside: Collection[str]) -> PartVerdict:
+    """The verdict that an error of one reading explains a gap: in part only, where its noise follows the motion.
+
+    The mean of what makes the noise looks like another error: a clock that is late by chance has a delay on average, a
+    contact that sways a gain. What a saturation leaves where the reading bends follows the motion as well.
+    """
+    catalogue = verdict.search.data.catalogue
+    sites = {catalogue[name].site for name in verdict.effects}
+    if len(sites) > 1 or any(catalogue[name].fault not in MEANS for name in verdict.effects):
+        return verdict
+    own = own_error(verdict, part, aside)
+    if own is None or not own.sites or part.lab.sensor(own.signal) not in sites:
+        return verdict
+    return replace(verdict, outcome="partly", probability=EITHER * verdict.probability, own=own)
