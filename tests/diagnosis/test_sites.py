@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from common.recording.imported import ImportedChannel
 from diagnosis.findings import where
+from diagnosis.findings.sensors.own_reading import gives_energy
 from diagnosis.findings.sites.likely import likely_sites, ranked
 from diagnosis.findings.verdict import judge, misplaced
 from diagnosis.findings.which import other_causes
-from diagnosis.fits import fitting, residuals
+from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search
@@ -201,3 +203,18 @@ def test_a_column_that_gives_energy_may_be_a_load_cell_with_hysteresis(
     assert found.effects == ("column.slip",)
     assert (found.probability < 0.5) == gives
     assert ["Hysteresis of its load cell" in text for text in other_causes(found)] == [True] * gives
+
+
+def test_a_force_that_a_logger_or_a_sensor_delays_gives_no_energy(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    part = lab_a(whole)
+    hardening = {"column.hardening": {"share": 0.2}}
+    slow = ImportedChannel(delay=0.01)
+    data = residuals.prepare(part, whole)
+    behind = replace(data, part=part.replaced(channels=(ImportedChannel(), slow)))
+    sensed = replace(data, system=data.system.sensed("column_force", delay=0.01))
+    for late in (behind, sensed):
+        fit = fitting.at(late, hardening, np.zeros(len(part.nuisances)))
+        displacement, force = late.part.predict(hypothesis.lay(late, fit.z, fit.values)).T
+        assert np.sum(force[:-1] * np.diff(displacement)) < 0.0
+        assert gives_energy(fit) == ""

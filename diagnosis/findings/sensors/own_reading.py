@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from common.plan.kinds import COLUMN
+from common.recording.imported import ImportedChannel
 from diagnosis.findings.sites.likely import REST
 from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.fits import candidates, hypothesis, worth
@@ -61,6 +62,10 @@ def gives_energy(fit: Fit) -> str:
     own = {name: values for name, values in fit.values.items() if data.catalogue[name].site == site}
     if not own:
         return ""
-    displacement, force = part.predict(hypothesis.lay(data, fit.z, own)).T
-    energy = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(displacement))
+    untouched = part.replaced(
+        channels=(ImportedChannel(),) * len(part.channels)
+    )  # by a logger's filters and delays
+    displacement, force = untouched.predict(hypothesis.lay(data, fit.z, own).unread).T
+    begun = 0.5 * float(max(force[0] * displacement[0], 0.0))  # J, held before the first tick
+    energy = begun + np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(displacement))
     return next(iter(own)) if energy.min() < -GIVEN * energy.max() else ""
