@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.plan.kinds import COLUMN
 from diagnosis.findings.sensors.one_motion import one_motion, one_place
 from diagnosis.findings.sensors.own_reading import errors, gives_energy, machine_alone
 from diagnosis.findings.sensors.slow_noise import under_less_noise
@@ -122,12 +123,13 @@ def with_effects(search: Search) -> PartVerdict:
 def other_cause(search: Search) -> bool:
     """Whether one other cause may look the same as what is named, to the last of what can be seen.
 
-    It is another part of a loop of which several values are named, another place of a machine in the place of offsets,
-    or another law of a machine of which a reading is named as well that shows nothing else: both are one function of
-    the same motion, as are a column that gives energy and a load cell with hysteresis. A small gap may have any cause.
+    It is another part of a loop of which several values are named, another law of a specimen of which several effects
+    are named, another place of a machine in the place of offsets, or another law of a machine of which a reading is
+    named as well that shows nothing else: both are one function of the same motion, as are a column that gives energy
+    and a load cell with hysteresis. A small gap may have any cause.
     """
     fit = search.chosen
-    machine = loop_of_several(search) or one_place(search)
+    machine = loop_of_several(search) or specimen_of_several(search) or one_place(search)
     return bool(machine or errors(fit) or gives_energy(fit) or small(search))
 
 
@@ -148,6 +150,25 @@ def loop_of_several(search: Search) -> str:
         if effect.site == loop and effect.apply(data.system, **given).effects == data.system.effects
     ]
     return loop if len(values) > 1 else ""
+
+
+def specimen_of_several(search: Search) -> str:
+    """The specimen of which several effects are named that are not all values of the plan, empty for none.
+
+    Each of its effects is a force that follows from one motion, as is the law of any specimen that the catalogue lacks:
+    two of them together imitate it.
+    """
+    data, part = search.data, laboratory_of(search.data.part)
+    if part is None or part.lab.kind.name != COLUMN:
+        return ""
+    specimen = part.lab.site(part.lab.kind.sites[1])
+    own = [
+        data.catalogue[name].apply(data.system, **given)
+        for name, given in search.chosen.values.items()
+        if data.catalogue[name].site == specimen
+    ]
+    laws = any(system.effects != data.system.effects for system in own)
+    return specimen if len(own) > 1 and laws else ""
 
 
 def odds(search: Search) -> list[float]:

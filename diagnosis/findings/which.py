@@ -12,7 +12,7 @@ from diagnosis.findings.certainty import trust
 from diagnosis.findings.certainty.intervals import Interval, intervals
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors.own_reading import errors, gives_energy
-from diagnosis.findings.verdict import EITHER, PartVerdict, loop_of_several, small
+from diagnosis.findings.verdict import EITHER, PartVerdict, loop_of_several, small, specimen_of_several
 from diagnosis.fits.fitting import Fit, without_rest
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps
@@ -122,22 +122,29 @@ def other_causes(verdict: PartVerdict) -> list[str]:
             f"What {described(verdict.search.chosen)} explains is so small that two good solutions of one model may "
             "differ by it. Something else as small may look the same."
         ]
-    if name := gives_energy(verdict.search.chosen):
-        return [
+    fit = verdict.search.chosen
+    sentences = [
+        f"{name} stands beside an effect that shows in this reading alone. Another law of the machine may look the "
+        "same: these signals cannot tell them apart."
+        for name in errors(fit)
+    ]
+    if name := gives_energy(fit):
+        sentences.append(
             f"With {name} the column gives more energy than it ever took, since its force falls later than it rises. "
             "Hysteresis of its load cell looks the same: these signals cannot tell them apart."
-        ]
-    loop = loop_of_several(verdict.search)
-    if not loop:
-        return [
-            f"{name} stands beside an effect that shows in this reading alone. Another law of the machine may look the "
-            "same: these signals cannot tell them apart."
-            for name in errors(verdict.search.chosen)
-        ]
-    return [
-        f"Several values of the plan are named of the {loop}. One other part of its loop, such as a filter in its "
-        "feedback, may look the same: these signals cannot tell them apart."
-    ]
+        )
+    loop, specimen = loop_of_several(verdict.search), specimen_of_several(verdict.search)
+    if loop:
+        sentences.append(
+            f"Several values of the plan are named of the {loop}. One other part of its loop, such as a filter in its "
+            "feedback, may look the same: these signals cannot tell them apart."
+        )
+    if specimen:
+        sentences.append(
+            f"Several effects of the {specimen} are named. One other law of this specimen may look the same: these "
+            "signals cannot tell them apart."
+        )
+    return sentences
 
 
 def described(fit: Fit) -> str:

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.sensors.one_motion import one_motion, one_place
-from diagnosis.findings.verdict import equivalents, judge, loop_of_several, other_cause
+from diagnosis.findings.verdict import (
+    equivalents,
+    judge,
+    loop_of_several,
+    other_cause,
+    specimen_of_several,
+)
 from diagnosis.findings.which import other_causes
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit
@@ -18,6 +24,7 @@ from tests.diagnosis.specimens import MadeSpecimen, data_of
 
 DATA = data_of(MadeSpecimen())
 NOISY = np.random.default_rng(3).standard_normal((DATA.groups, 1))
+FRICTION = {"force": 900.0, "presliding": 1e-5, "velocity": 1e-6}
 
 
 def fit(names: str, apart: float) -> Fit:
@@ -61,6 +68,31 @@ def test_several_values_of_a_damper_are_parts_of_their_own(cases: Cases) -> None
     bare = fitting.at(data, {}, np.zeros(len(data.part.nuisances)))
     values = {"damper.mass": {"factor": 1.1}, "damper.stiffness": {"factor": 1.1}}
     assert loop_of_several(Search(data, bare, fitting.at(data, values, bare.z), ())) == ""
+
+
+def test_several_effects_of_a_specimen_may_be_one_other_law_of_it(cases: Cases) -> None:
+    true = {"column.stiffness": {"factor": 0.85}, "column.friction": FRICTION}
+    whole = cases.record(true, duration=STRONGEST)
+    data = residuals.prepare(lab_a(whole), whole)
+    bare, both = (fitting.fit(data, values) for values in ({}, true))
+    found = judge(Search(data, bare, both, ()))
+    assert (found.outcome, set(found.effects)) == ("explained", set(true))
+    assert 0.4 < found.probability < 0.5
+    assert "column" in other_causes(found)[0]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"column.friction": FRICTION},
+        {"column.stiffness": {"factor": 0.85}},
+        {"column.friction": FRICTION, "actuator.delay": {"delay": 0.004}},
+    ],
+)
+def test_one_effect_of_a_specimen_is_one_law(cases: Cases, values: dict[str, dict[str, float]]) -> None:
+    data = residuals.prepare(lab_a(whole := cases.record()), whole)
+    bare = fitting.at(data, {}, np.zeros(len(data.part.nuisances)))
+    assert specimen_of_several(Search(data, bare, fitting.at(data, values, bare.z), ())) == ""
 
 
 @pytest.mark.parametrize(("share", "one"), [(1.0, True), (-1.0, False), (0.3, False)])
