@@ -13,7 +13,7 @@ from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.afresh import afresh
-from diagnosis.fits.laws.best import in_best_laws
+from diagnosis.fits.laws.best import in_best_laws, under_the_first
 from diagnosis.fits.laws.specimen import follow, path
 from diagnosis.fits.laws.starts import gridded
 from diagnosis.fits.laws.unlike_first import unlike_first
@@ -26,6 +26,7 @@ from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect, Parameter
 from models.specimens.fit import SpecimenFit, forces
 from models.system import System
+from tests.diagnosis.cases import STRONGEST, Cases, lab_a
 from tests.diagnosis.specimens import (
     HARDENING,
     INTERVAL,
@@ -299,3 +300,19 @@ def test_an_effect_whose_left_out_shape_does_what_a_second_effect_does_stands_al
     (one,) = alone(both)
     assert one.names == ("column.pinching",)
     assert simplest([both, one])[0] is one
+
+
+PINCHED = {"factor": 0.4144, "hardening": 0.2474, "width": 2.7e-3}
+
+
+@pytest.mark.parametrize(("tails", "first"), [(None, True), (0.5, False)])
+def test_a_law_that_is_nearly_the_first_one_leads_back_to_it(
+    tails: float | None, first: bool, cases: Cases
+) -> None:
+    own = {} if tails is None else {"tails": tails, "law": 1.0}
+    whole = cases.record({"column.pinching": PINCHED | own}, duration=STRONGEST)
+    data = residuals.prepare(lab_a(whole), whole)
+    begun = PINCHED | {"tails": 20.0 if tails is None else tails, "law": 1.0}
+    led = under_the_first(fitting.fit(data, {"column.pinching": begun}))
+    assert ("law" not in led.values["column.pinching"]) is first
+    assert led.chi < 1.2 * led.reduced.size

@@ -50,8 +50,8 @@ def in_best_laws(fits: list[Fit], *, modelled: bool = True) -> list[Fit]:
         if whole(fits[0]):
             return fits
     others = raced([item for item in fits if excess(item) <= FARTHEST * excess(fits[0])], modelled=modelled)
-    better = sorted((others.get(item.names[-1], item) for item in fits), key=cost)
-    return ending(better, fits)
+    better = ending(sorted((others.get(item.names[-1], item) for item in fits), key=cost), fits)
+    return sorted([under_the_first(better[0]), *better[1:]], key=cost)
 
 
 def whole(fit: Fit) -> bool:
@@ -66,6 +66,18 @@ def ending(better: list[Fit], fits: list[Fit]) -> list[Fit]:
         done.append(descended(better[0]))
         better = sorted([done[-1], *better[1:]], key=cost)
     return better
+
+
+def under_the_first(fit: Fit) -> Fit:
+    """The fit with its last effect under the first of its laws, begun where a further law has led, if that is as good.
+
+    A further law that is nearly the first one leads past what stopped a fit under this.
+    """
+    effect, values = last(fit), fit.values[fit.names[-1]]
+    if not values.get("law"):
+        return fit
+    start = fit.values | {effect.name: effect.under(0, values)}
+    return simplest(fitting.fit(fit.data, start, fit.z), [fit])
 
 
 def raced(fits: list[Fit], most: float = math.inf, *, modelled: bool = True) -> dict[str, Fit]:
