@@ -79,18 +79,23 @@ def share_likeliest(verdict: PartVerdict) -> float:
 def signs(found: Diagnosis) -> dict[str, float]:
     """The signs of a diagnosis by name, empty where nothing is named.
 
-    clear: log of the smallest trace of an effect named over the largest systematic residual left in any part, both over
-    noise; names: how many effects are named beside the first.
+    clear: the least, over the parts, of the log of the smallest trace of an effect named in a part over the systematic
+    residual left in it, both over noise; what is left in a part without names counts against the smallest trace of all.
+    names: how many effects are named beside the first.
     """
     named = [verdict for verdict in found.verdicts if verdict.effects]
     count = sum(len(verdict.effects) for verdict in named) + len(found.readings) + len(found.link)
     if not count:
         return {}
-    traces = [
-        math.sqrt(float(np.max(size)) / verdict.search.data.group)
-        for verdict in named
-        for size in worth.changes(verdict.search.chosen)
-    ]
-    left = max((remaining(verdict.search.chosen) for verdict in found.verdicts), default=0.0)
-    trace = max(min(traces, default=1.0), LEAST_TRACE)
-    return {"clear": math.log(trace / (left + MATERIAL)), "names": count - 1.0}
+    traces = [smallest_trace(verdict) for verdict in named]
+    open_parts = [verdict for verdict in found.verdicts if not verdict.effects]
+    compared = [*zip(traces, named, strict=True), *((min(traces, default=1.0), one) for one in open_parts)]
+    clear = [math.log(trace / (remaining(verdict.search.chosen) + MATERIAL)) for trace, verdict in compared]
+    return {"clear": min(clear, default=math.log(1.0 / MATERIAL)), "names": count - 1.0}
+
+
+def smallest_trace(verdict: PartVerdict) -> float:
+    """How far the least of the effects that a verdict names stands out of the noise."""
+    sizes = worth.changes(verdict.search.chosen)
+    least = math.sqrt(min(float(np.max(size)) for size in sizes) / verdict.search.data.group)
+    return max(least, LEAST_TRACE)
