@@ -249,3 +249,8 @@ class System:
         sensors = self.effects.sensors
         changed = replace(sensors.get(signal, SensorEffects()), **values)
         return replace(self, effects=replace(self.effects, sensors=sensors | {signal: changed}))
+
+    def recorded(self, signal: str, *, delay: float = 0.0, gain: float = 1.0) -> System:
+        """The system of which a logger records one reading, with its sensor's errors, late (s) and times a gain."""
+        own = self.effects.sensors.get(signal, SensorEffects())
+        return self.sensed(signal, delay=own.delay + delay, gain=own.gain * gain)

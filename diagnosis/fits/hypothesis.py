@@ -28,11 +28,11 @@ Values = dict[str, dict[str, float]]  # effect → parameter → value
 
 
 def lay(data: Data, z: Array, values: Values) -> System:
-    """The plan with parameters moved and effects laid over it."""
+    """The plan with parameters moved and effects laid over it, behind the logger."""
     system = data.moved(z)
     for name, given in values.items():
         system = data.catalogue[name].apply(system, **given)
-    return system
+    return data.logged(system, z)
 
 
 @dataclass(frozen=True)

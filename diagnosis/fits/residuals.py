@@ -72,16 +72,22 @@ class Data:
         return {}
 
     def moved(self, z: Array) -> System:
-        """The plan with its nominal parameters, and the logger's properties, at z (nuisances,) tolerances."""
+        """The plan with its nominal parameters at z (nuisances,) tolerances, without what the logger did."""
         place = z.tobytes()
         system = self._systems.get(place)
         if system is None:
             system = self.system
             for nuisance, by in zip(self.part.nuisances, z, strict=True):
-                system = nuisance.moved(system, float(by))
+                system = system if nuisance.of_record else nuisance.moved(system, float(by))
             if len(self._systems) >= KEPT:
                 self._systems.clear()
             self._systems[place] = system
+        return system
+
+    def logged(self, system: System, z: Array) -> System:
+        """A system whose readings, with the errors of their sensors, the logger recorded as z (nuisances,) says."""
+        for nuisance, by in zip(self.part.nuisances, z, strict=True):
+            system = nuisance.moved(system, float(by)) if nuisance.of_record else system
         return system
 
     @property

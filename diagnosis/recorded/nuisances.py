@@ -61,7 +61,7 @@ class ChannelGain(Nuisance):
 
     def moved(self, system: System, z: float) -> System:
         """The system whose reading has that gain."""
-        return system if z == 0.0 else system.sensed(self.signal, gain=1.0 + z * self.tolerance)
+        return system if z == 0.0 else system.recorded(self.signal, gain=1.0 + z * self.tolerance)
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,9 @@ class LoggedForce(Nuisance):
     def moved(self, system: System, z: float) -> System:
         """The system whose reading of that force has the logger's delay or gain."""
         value = z * self.tolerance
-        return system.sensed(
-            self.signal,
-            **({"delay": self.about + value} if self.parameter == "delay" else {"gain": 1.0 + value}),
-        )
+        if self.parameter == "delay":
+            return system.recorded(self.signal, delay=self.about + value)
+        return system.recorded(self.signal, gain=1.0 + value)
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ class LoggedReadings(Nuisance):
         if values in ({"gain": 1.0}, {"delay": 0.0}):
             return system
         for name in self.signals:
-            system = system.sensed(name, **values)
+            system = system.recorded(name, **values)
         return system
 
 

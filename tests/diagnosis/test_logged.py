@@ -18,7 +18,7 @@ from diagnosis.diagnose import judged, own_noise, still
 from diagnosis.findings import gaps, how_far, report, verdict
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logger import by_building
-from diagnosis.fits import fitting, residuals, settling, worth
+from diagnosis.fits import fitting, hypothesis, residuals, settling, worth
 from diagnosis.fits.residuals import over_longer
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
@@ -26,7 +26,7 @@ from diagnosis.recorded import logged_building
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.loop import RecordedLoop
-from diagnosis.recorded.parts import Building
+from diagnosis.recorded.parts import CALIBRATED, Building
 from diagnosis.recorded.record import Delay, Late, Record
 from diagnosis.report.records import HowFar
 from diagnosis.signals import alike
@@ -91,6 +91,23 @@ def test_readings_without_a_delay_cost_little_where_a_building_hardly_tells_one(
         for late in (Delay(1e-3), Delay(1e-3, 6e-4))
     )
     assert hardly < 0.6 * surely  # (0.5 ms)² of 0.25 + 0.36, of which the actuator's own delay bears a part
+
+
+def test_what_a_logger_did_adds_to_the_error_of_a_sensor(cases: Cases) -> None:
+    whole, late = cases.record(), Delay(4e-3)
+    data = residuals.prepare(lab_a(whole).logged(Late(late, late)), whole)
+    true = {
+        "sensor.column_displacement.delay": {"delay": 3e-3},
+        "sensor.column_displacement.gain": {"factor": 1.1},
+    }
+    places = [item.name for item in data.part.nuisances]
+    z = np.zeros(len(places))
+    z[places.index("gain")] = 1.0
+    system = hypothesis.lay(data, z, true)
+    wrong, other = (system.effects.sensors[name] for name in ("column_displacement", "column_force"))
+    assert wrong.delay == pytest.approx(other.delay + 3e-3)
+    assert wrong.gain == pytest.approx(1.1 * other.gain)
+    assert (other.delay, other.gain) == (pytest.approx(late.about), pytest.approx(1.0 + CALIBRATED))
 
 
 def test_delaying_a_reading_keeps_its_noise_level() -> None:

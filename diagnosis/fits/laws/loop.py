@@ -16,7 +16,7 @@ import numpy as np
 from common.plan.kinds import TABLE
 from diagnosis.fits import fitting, worth
 from diagnosis.fits.fitting import Fit, excess
-from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.hypothesis import Values, lay
 from diagnosis.fits.laws.best import BETTER, frees
 from diagnosis.fits.laws.loop_response import LoopResponse
 from diagnosis.fits.residuals import Data
@@ -182,7 +182,7 @@ def zeros(bare: Fit, signals: Sequence[str]) -> Values:
     """Readings that are off by a constant, which spectra do not show: each by the mean of what a fit leaves."""
     data = bare.data
     off = dict(
-        zip(data.part.signals, np.mean(data.residual(data.moved(bare.z)), axis=0).tolist(), strict=True)
+        zip(data.part.signals, np.mean(data.residual(lay(data, bare.z, {})), axis=0).tolist(), strict=True)
     )
     return {
         effect.name: {effect.parameters[0].name: off[effect.signal]}
