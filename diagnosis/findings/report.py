@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -52,7 +52,7 @@ def build(
     status = status_of(found)
     shrunk = status != "explained" or how_far.shrinks(found, far.how_far)
     signs = trust.signs(found)
-    named = which(found, signs, 1.0 if shrunk else max(far.how_far.closed or 0.0, 0.0))
+    named = which(found, signs, 1.0 if shrunk else most_probable(far.how_far, signs))
     tell("the next test", 0, 0)
     tests = next_test.choices(found)
     whole = Report(
@@ -77,6 +77,17 @@ def build(
         details=details.details(found, far, named.candidates, tests, signs),
     )
     return Judged(without_times(whole, found.record) if found.record.static else whole, found)
+
+
+def most_probable(far: HowFar, signs: Mapping[str, float]) -> float:
+    """The largest probability of effects that explain the readings of their part, but not the gap.
+
+    In the same recording that of a partial verdict: errors of nominal parameters, which the loop magnifies, may be all
+    that is left of the gap. On other recordings the share that closes: a true cause with its law closes there as well.
+    """
+    if far.judged_on == how_far.OTHERS:
+        return max(far.closed or 0.0, 0.0)
+    return trust.PARTLY.probability(signs)
 
 
 def open_gap(far: HowFar) -> str:

@@ -16,6 +16,7 @@ from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, L
 from common.roles import MASTER
 from diagnosis.diagnose import judged, own_noise, still
 from diagnosis.findings import gaps, how_far, report, verdict
+from diagnosis.findings.certainty import trust
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logger import by_building
 from diagnosis.fits import fitting, hypothesis, residuals, settling, worth
@@ -183,6 +184,10 @@ def test_an_effect_that_hardly_closes_the_gap_is_not_an_explanation(cases: Cases
     assert report.open_gap(far) == report.OPEN
     assert how_far.shrinks(found, replace(far, closed=0.9, judged_on=how_far.OTHERS))
     assert how_far.shrinks(Diagnosis(whole), far)
+    signs = {"clear": 3.0, "names": 0.0}
+    assert report.most_probable(far, signs) == trust.PARTLY.probability(signs) > 0.5
+    assert report.most_probable(replace(elsewhere, closed=0.1), signs) == 0.1
+    assert report.most_probable(replace(elsewhere, closed=-0.1), signs) == 0.0
 
 
 @pytest.mark.parametrize(
