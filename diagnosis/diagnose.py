@@ -206,14 +206,21 @@ def noise(verdicts: Sequence[PartVerdict], of: Callable[[Search], Array]) -> dic
 def machines_first(
     record: Record, verdicts: Sequence[PartVerdict], noisy: Sequence[SensorFinding]
 ) -> tuple[list[PartVerdict], list[SensorFinding]]:
-    """The verdicts and the noise found on sensors, where noise that a machine's motion or an effect makes is none."""
+    """The verdicts and the noise found on sensors, where noise that a machine's motion or an effect makes is none.
+
+    Nor is what effects leave, where it follows the motion.
+    """
     signal = {item: record.catalogue[item.effect].signal for item in noisy if item.parameter == "rms"}
     usual = {name: item.usual for item, name in signal.items()}
     result, none = [], set[str]()
     for verdict in verdicts:
-        moved = no_noise(verdict, usual, Scales(record))
-        none |= set(verdict.search.data.part.signals if moved else ())
-        result.append(moved or verdict)
+        if moved := no_noise(verdict, usual, Scales(record)):
+            none |= set(verdict.search.data.part.signals)
+            result.append(moved)
+        else:
+            moved, left = uneven_noise.beside_effects(verdict, usual)
+            none |= left
+            result.append(moved)
     return result, [item for item in noisy if signal.get(item) not in none]
 
 
