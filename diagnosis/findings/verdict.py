@@ -153,7 +153,7 @@ def loop_of_several(search: Search) -> str:
 
 
 def specimen_of_several(search: Search) -> str:
-    """The specimen of which several effects are named that are not all values of the plan, empty for none.
+    """The column of which several effects are named that are not all values of the plan, empty for none.
 
     Each of its effects is a force that follows from one motion, as is the law of any specimen that the catalogue lacks:
     two of them together imitate it.

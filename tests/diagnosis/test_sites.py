@@ -128,13 +128,26 @@ def test_a_force_that_depends_on_the_stroke_lies_at_the_damper(cases: Cases) -> 
     assert likely_sites(judged(part, data, truth)) == ("damper",)
 
 
-def test_a_scale_that_bends_lies_at_the_load_cell_and_not_at_the_column_before_it(cases: Cases) -> None:
+@pytest.mark.parametrize(
+    ("damping", "of_column", "sites"),
+    [
+        (0.0, False, ("column", "sensor.column_force")),  # the force is the displacement times the stiffness
+        (0.0, True, ("column", "sensor.column_force")),
+        (5e4, False, ("sensor.column_force",)),
+        (5e4, True, ("column",)),
+    ],
+)
+def test_a_scale_that_bends_is_told_from_a_column_that_softens_by_the_column_s_damping(
+    damping: float, of_column: bool, sites: tuple[str, ...], cases: Cases
+) -> None:
     whole = cases.record(duration=SECONDS)
     part = lab_a(whole)
     data = residuals.prepare(part, whole)
+    data = replace(data, system=data.system.moved("column", damping=damping))
     truth = part.predict(data.system)
-    truth[:, 1] = softer(truth[:, 1])
-    assert likely_sites(judged(part, data, truth)) == ("sensor.column_force",)
+    elastic = data.system.plan.column.stiffness * truth[:, 0]
+    truth[:, 1] += softer(elastic) - elastic if of_column else softer(truth[:, 1]) - truth[:, 1]
+    assert likely_sites(judged(part, data, truth)) == sites
 
 
 def test_a_force_that_depends_on_the_speed_lies_at_the_column(cases: Cases) -> None:
@@ -218,3 +231,11 @@ def test_a_force_that_a_logger_or_a_sensor_delays_gives_no_energy(cases: Cases) 
         displacement, force = late.part.predict(hypothesis.lay(late, fit.z, fit.values)).T
         assert np.sum(force[:-1] * np.diff(displacement)) < 0.0
         assert gives_energy(fit) == ""
+
+
+def test_several_effects_with_which_a_column_gives_energy_are_said_together(cases: Cases) -> None:
+    whole = cases.record(duration=SECONDS)
+    data = residuals.prepare(lab_a(whole), whole)
+    effects = {"column.stiffness": {"factor": 0.9}, "column.slip": {"gap": 1e-4, "law": 2.0}}
+    fit = fitting.at(data, effects, np.zeros(len(data.part.nuisances)))
+    assert gives_energy(fit) == "column.stiffness and column.slip"

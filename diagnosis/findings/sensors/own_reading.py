@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from common.plan.kinds import COLUMN
-from common.recording.imported import ImportedChannel
+from common.recording.imported import NOTHING_STATED
 from diagnosis.findings.sites.likely import REST
 from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.fits import candidates, hypothesis, worth
@@ -50,7 +50,7 @@ def errors(fit: Fit) -> list[str]:
 
 
 def gives_energy(fit: Fit) -> str:
-    """The effect of a fit with which a column gives more energy than it ever took, empty for none.
+    """The effects of a fit with which a column gives more energy than it ever took, in words, empty for none.
 
     Its force falls later than it rises. No specimen by itself does that, while a load cell with hysteresis reads any
     specimen so.
@@ -62,10 +62,8 @@ def gives_energy(fit: Fit) -> str:
     own = {name: values for name, values in fit.values.items() if data.catalogue[name].site == site}
     if not own:
         return ""
-    untouched = part.replaced(
-        channels=(ImportedChannel(),) * len(part.channels)
-    )  # by a logger's filters and delays
-    displacement, force = untouched.predict(hypothesis.lay(data, fit.z, own).unread).T
+    unfiltered = part.replaced(channels=(NOTHING_STATED,) * len(part.channels))
+    displacement, force = unfiltered.predict(hypothesis.lay(data, fit.z, own).unread).T
     begun = 0.5 * float(max(force[0] * displacement[0], 0.0))  # J, held before the first tick
     energy = begun + np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(displacement))
-    return next(iter(own)) if energy.min() < -GIVEN * energy.max() else ""
+    return " and ".join(own) if energy.min() < -GIVEN * energy.max() else ""

@@ -4,11 +4,15 @@ Both may change the same reading alone. A sensor errs by a function of the value
 before, or by a zero that drifts; a machine by a force that depends on its motion and speed. The force reaches the
 reading through the machine's own dynamics: that of a damper moves a mass on a spring. Ridge regressions on either
 predict stretches of time that they have not seen, and the likelihoods of these predictions tell the two apart.
+
+More functions predict worse where few would do. So the few that both have are asked by themselves as well: a specimen
+without mass and damping whose law bends is, to the last digit, a load cell whose scale bends, and neither is likelier.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -31,7 +35,7 @@ def lead(fit: Fit, part: LaboratoryPart, sensor: str, machine: str) -> float:
 
     Zero where the machine has none that depends on a motion, and where what is left is a function of neither. If the
     machine errs, its true motion is what was read, or what was predicted, which has less noise, where it errs little.
-    If the sensor errs, it is what was predicted.
+    If the sensor errs, and where the machine's force moves nothing, it is what was predicted.
     """
     data, place = fit.data, [part.lab.sensor(name) for name in part.signals].index(sensor)
     interval = data.system.plan.test.interval * data.group
@@ -42,20 +46,19 @@ def lead(fit: Fit, part: LaboratoryPart, sensor: str, machine: str) -> float:
     said = np.nan_to_num(data.part.predict(system))
     read = said + data.residual(system)
     forced = [
-        remainder(
-            fit, place, through(of_motion(data.averaged(motion[:, way.motion]), others, interval), way, place)
-        )
+        through(columns, way, place)
         for way in signatures(part, system, frequencies)
         if way.site == machine and way.motion is not None and np.any(way.readings[:, place])
-        for motion in (said, read)
+        for motion in ((said, read) if np.any(way.readings[:, way.motion]) else (said,))
+        for columns in of_motion(data.averaged(motion[:, way.motion]), others, interval)
     ]
     if not forced:
         return 0.0
-    own = remainder(fit, place, of_reading(data.averaged(said[:, place])))
-    other = min(forced, key=lambda left: float(left @ left))
+    own = least(fit, place, of_reading(data.averaged(said[:, place])))
+    other = least(fit, place, forced)
     whole = float(np.mean(np.square(fit.reduced[:, place])))
-    least = min(float(np.mean(np.square(left))) for left in (own, other))
-    return nats(own, other) if whole - least > HALF * (whole - 1.0) else 0.0
+    left = min(float(np.mean(np.square(one))) for one in (own, other))
+    return nats(own, other) if whole - left > HALF * (whole - 1.0) else 0.0
 
 
 def nats(own: Array, other: Array) -> float:
@@ -71,22 +74,29 @@ def nats(own: Array, other: Array) -> float:
     return math.copysign(0.5 * own.size / remembers * math.log1p(apart), two - one)
 
 
-def of_reading(read: Array) -> Array:
-    """Functions (n, …) of what is read (n,) and of what that was before, and slow ones of time."""
-    value = around(read[:, None])
-    return np.hstack([value, bent(value), plays(value), slow(read.size)])
+def of_reading(read: Array) -> Iterator[Array]:
+    """Functions (n, …) of what is read (n,) and of what that was before, and these with slow ones of time."""
+    simple = of_value(around(read[:, None]))
+    yield simple
+    yield np.hstack([simple, slow(read.size)])
 
 
-def of_motion(motion: Array, others: Array, interval: float) -> Array:
-    """Functions (n, …) of a motion (n,), of its speed and of its history, and of `others` (n, m) by themselves.
+def of_motion(motion: Array, others: Array, interval: float) -> Iterator[Array]:
+    """The same functions (n, …) of a motion (n,), and these with ones of its speed, and of `others` (n, m) as well.
 
     These are what the laboratory was told and how its other readings change: what a mass or a motor makes of them.
     """
     value, beside = around(motion[:, None]), around(others)
-    speed = scaled(np.gradient(value, axis=0))
-    own = [bent(value), bent(speed), plays(value), mixed(value, speed), aged(value, speed)]
+    simple, speed = of_value(value), scaled(np.gradient(value, axis=0))
+    yield simple
+    own = [bent(speed), mixed(value, speed), aged(value, speed)]
     bend = scaled(np.gradient(speed, axis=0))
-    return np.hstack([value, speed, bend, *own, bent(beside), lagged(np.hstack([value, beside]), interval)])
+    yield np.hstack([simple, speed, bend, *own, bent(beside), lagged(np.hstack([value, beside]), interval)])
+
+
+def of_value(value: Array) -> Array:
+    """Functions (n, …) of a value (n, 1), and of what that was before."""
+    return np.hstack([value, bent(value), plays(value)])
 
 
 def around(values: Array) -> Array:
@@ -100,6 +110,11 @@ def through(forces: Array, way: Signature, place: int) -> Array:
     spectrum = np.fft.rfft(forces - forces[0], 2 * count, axis=0)
     response = way.readings[:, place] * (1.0 if way.receptance is None else way.receptance)
     return np.asarray(np.fft.irfft(spectrum * response[:, None], 2 * count, axis=0)[:count])
+
+
+def least(fit: Fit, place: int, families: Iterable[Array]) -> Array:
+    """What the best of several families of functions, each (n, …), leaves of a reading's residuals (n,)."""
+    return min((remainder(fit, place, one) for one in families), key=lambda left: float(left @ left))
 
 
 def remainder(fit: Fit, place: int, columns: Array) -> Array:

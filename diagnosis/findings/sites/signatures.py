@@ -28,10 +28,8 @@ from models.registry import Array
 from models.system import System
 
 Spectrum = NDArray[np.complex128]
-STROKE, DISPLACEMENT = (
-    2,
-    0,
-)  # places of the damper's stroke and of the column's displacement among the readings
+# Places of the damper's stroke, and of the column's displacement, among the readings of their laboratories.
+STROKE, DISPLACEMENT = 2, 0
 
 
 class Signature(NamedTuple):
