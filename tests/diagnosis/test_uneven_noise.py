@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.diagnose import by_itself, diagnose, machines_first
+from diagnosis.diagnose import by_itself, diagnose
+from diagnosis.findings.certainty.trust import share_likeliest
 from diagnosis.findings.sensors import uneven_noise
-from diagnosis.findings.sensors.readings import SensorFinding
-from diagnosis.findings.verdict import judge
-from diagnosis.fits import residuals
+from diagnosis.findings.verdict import OwnError, PartVerdict, judge
+from diagnosis.fits import fitting, residuals
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import search
+from diagnosis.fits.search import Search, search
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.record import Record
 from models.registry import Array
@@ -21,8 +21,6 @@ from tests.diagnosis.cases import Cases, lab_b
 
 TICKS = 6000
 SIZE = 0.6  # rms of an error over that of the noise: less than what is seen in averages
-
-NOISY = SensorFinding("sensor.damper_force.noise", "rms", 1.6, (1.5, 1.7), 8.0)
 
 
 def white(seed: int, count: int = TICKS) -> Array:
@@ -63,6 +61,29 @@ def test_a_clock_that_is_early_by_chance_is_no_delay_and_no_effect_of_the_table(
     assert found.where[0].site == "sensor.table_displacement"
     assert not found.which[0].effects or (found.which[0].probability or 0.0) < 0.5
     assert any(one.startswith("The noise of table_displacement follows") for one in found.warnings)
+
+
+def test_a_doubt_of_a_delay_says_nothing_for_the_alternatives_to_it(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = cases.record(duration=8.0)
+    part = lab_b(whole)
+    data = residuals.prepare(part, whole)
+    late, lagging, bare = (
+        fitting.at(data, values, np.zeros(len(part.nuisances)))
+        for values in (
+            {"sensor.damper_stroke.delay": {"delay": 1e-3}},
+            {"sensor.damper_stroke.lag": {"lag": 1e-3}},
+            {},
+        )
+    )
+    verdict = PartVerdict(Search(data, bare, late, (lagging,)), "explained", 0.9, ((lagging, 0.06),), ())
+    own = OwnError("damper_stroke", 1.0, ("sensor.damper_stroke",))
+    monkeypatch.setattr(uneven_noise, "own_error", lambda *_: own)
+    found = uneven_noise.doubting(verdict, part, ())
+    assert found.outcome == "partly"
+    assert found.probability == pytest.approx(0.45)
+    assert share_likeliest(found) == pytest.approx(share_likeliest(verdict))
 
 
 def test_readings_of_which_something_is_known_are_left_aside(cases: Cases) -> None:
@@ -108,21 +129,3 @@ def test_what_a_model_errs_by_does_not_count() -> None:
     assert min(seen.significance, none.significance) > uneven_noise.SURE
     assert seen.ratio > 0.5
     assert none.ratio == 0.0
-
-
-@pytest.mark.parametrize("follows", [True, False])
-def test_loud_noise_beside_an_effect_is_its_sensors_only_where_it_is_steady(
-    follows: bool, cases: Cases
-) -> None:
-    whole = cases.record({"damper.friction": {"force": 3.0}}, duration=12.0)
-    read = whole.signals["damper_force"]
-    made = white(7, read.size) * (np.abs(read) if follows else 1.0)
-    made *= 8.0 * whole.planned_noise["damper_force"] / np.sqrt(np.mean(made**2))
-    loud = replace(whole, signals=whole.signals | {"damper_force": read + made})
-    verdict = judge(search(residuals.prepare(lab_b(loud), loud), Scales(loud)))
-    assert verdict.effects == ("damper.friction",)
-    explained = replace(verdict, outcome="explained")
-    told, left = uneven_noise.beside_effects(explained, {"damper_force"})
-    assert (told.outcome, left) == (("partly", {"damper_force"}) if follows else ("explained", set()))
-    assert machines_first(loud, [explained], [NOISY])[1] == ([] if follows else [NOISY])
-    assert uneven_noise.beside_effects(explained, {"table_displacement"}) == (explained, set())
