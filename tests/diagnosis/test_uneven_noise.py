@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.diagnose import by_itself, diagnose
+from diagnosis.diagnose import by_itself, diagnose, machines_first
 from diagnosis.findings.certainty.trust import share_likeliest
 from diagnosis.findings.sensors import uneven_noise
+from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.verdict import OwnError, PartVerdict, judge
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.scales import Scales
@@ -21,6 +22,8 @@ from tests.diagnosis.cases import Cases, lab_b
 
 TICKS = 6000
 SIZE = 0.6  # rms of an error over that of the noise: less than what is seen in averages
+
+NOISY = SensorFinding("sensor.damper_force.noise", "rms", 1.6, (1.5, 1.7), 8.0)
 
 
 def white(seed: int, count: int = TICKS) -> Array:
@@ -129,3 +132,21 @@ def test_what_a_model_errs_by_does_not_count() -> None:
     assert min(seen.significance, none.significance) > uneven_noise.SURE
     assert seen.ratio > 0.5
     assert none.ratio == 0.0
+
+
+@pytest.mark.parametrize("follows", [True, False])
+def test_loud_noise_beside_an_effect_is_its_sensors_only_where_it_is_steady(
+    follows: bool, cases: Cases
+) -> None:
+    whole = cases.record({"damper.friction": {"force": 3.0}}, duration=12.0)
+    read = whole.signals["damper_force"]
+    made = white(7, read.size) * (np.abs(read) if follows else 1.0)
+    made *= 8.0 * whole.planned_noise["damper_force"] / np.sqrt(np.mean(made**2))
+    loud = replace(whole, signals=whole.signals | {"damper_force": read + made})
+    verdict = judge(search(residuals.prepare(lab_b(loud), loud), Scales(loud)))
+    assert verdict.effects == ("damper.friction",)
+    explained = replace(verdict, outcome="explained")
+    told, left = uneven_noise.beside_effects(explained, {"damper_force"})
+    assert (told.outcome, left) == (("partly", {"damper_force"}) if follows else ("explained", set()))
+    assert machines_first(loud, [explained], [NOISY])[1] == ([] if follows else [NOISY])
+    assert uneven_noise.beside_effects(explained, {"table_displacement"}) == (explained, set())

@@ -138,14 +138,16 @@ def standard(values: Array) -> Array:
     return np.asarray(apart / np.maximum(apart.std(axis=0), 1e-300))
 
 
+def following(verdict: PartVerdict) -> dict[str, Uneven]:
+    """The noise of the readings, by signal, that surely follows the motion."""
+    found = zip(verdict.search.data.part.signals, uneven(verdict.search.chosen), strict=True)
+    return {name: one for name, one in found if one.significance > SURE and one.ratio > SEEN}
+
+
 def own_error(verdict: PartVerdict, part: LaboratoryPart, aside: Collection[str] = ()) -> OwnError | None:
     """The noise that follows the motion most; something else is known of readings `aside`."""
     data = verdict.search.data
-    seen = {
-        name: one
-        for name, one in zip(data.part.signals, uneven(verdict.search.chosen), strict=True)
-        if one.significance > SURE and one.ratio > SEEN and name not in aside
-    }
+    seen = {name: one for name, one in following(verdict).items() if name not in aside}
     if not seen:
         return None
     name, most = max(seen.items(), key=lambda item: item[1].significance)
@@ -174,3 +176,19 @@ def doubting(verdict: PartVerdict, part: LaboratoryPart, aside: Collection[str])
     return replace(
         verdict, outcome="partly", probability=EITHER * verdict.probability, others=others, own=own
     )
+
+
+def beside_effects(verdict: PartVerdict, loud: Collection[str]) -> tuple[PartVerdict, set[str]]:
+    """The verdict on effects, and the readings, by signal, whose `loud` noise beside them follows the motion.
+
+    A sensor is as loud at rest as in motion, so that what looks like its noise is left by the effects, whose law is not
+    the true one: they explain a gap in part.
+    """
+    if not verdict.effects or not set(loud) & set(verdict.search.data.part.signals):
+        return verdict, set()
+    left = {name: one for name, one in following(verdict).items() if name in loud}
+    if left and verdict.outcome == "explained":
+        name, most = max(left.items(), key=lambda item: item[1].significance)
+        text = f"The noise of {name} beside the effects named follows the motion: their law leaves it."
+        verdict = replace(verdict, outcome="partly", own=OwnError(name, most.ratio, (), text))
+    return verdict, set(left)
