@@ -253,4 +253,5 @@ class System:
     def recorded(self, signal: str, *, delay: float = 0.0, gain: float = 1.0) -> System:
         """The system of which a logger records one reading, with its sensor's errors, late (s) and times a gain."""
         own = self.effects.sensors.get(signal, SensorEffects())
-        return self.sensed(signal, delay=own.delay + delay, gain=own.gain * gain)
+        values = {name: gain * getattr(own, name) for name in ("gain", "bias", "drift", "saturation")}
+        return self.sensed(signal, delay=own.delay + delay, **values)

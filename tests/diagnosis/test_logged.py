@@ -112,6 +112,15 @@ def test_what_a_logger_did_adds_to_the_error_of_a_sensor(cases: Cases) -> None:
     assert other.gain == pytest.approx(1.0 + CALIBRATED)
 
 
+def test_a_logger_s_gain_acts_on_all_that_a_sensor_says(cases: Cases) -> None:
+    part = lab_a(whole := cases.record())
+    wrong = whole.systems[part.role].sensed(
+        "column_force", gain=1.1, bias=500.0, drift=20.0, saturation=2e4, saturation_sharpness=3.0
+    )
+    said, recorded = (part.predict(one)[:, 1] for one in (wrong, wrong.recorded("column_force", gain=1.02)))
+    np.testing.assert_allclose(recorded, 1.02 * said, rtol=1e-9)
+
+
 def test_delaying_a_reading_keeps_its_noise_level() -> None:
     noise = white(22, 4000)
     assert np.std(earlier(noise, 0.5)) == pytest.approx(np.std(noise), rel=0.01)
