@@ -9,12 +9,13 @@ import pytest
 
 from diagnosis.diagnose import by_itself, diagnose, machines_first
 from diagnosis.findings.certainty.trust import share_likeliest
-from diagnosis.findings.sensors import uneven_noise
+from diagnosis.findings.sensors import jumps, outliers, swaying, uneven_noise
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.verdict import OwnError, PartVerdict, judge
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
+from diagnosis.fits.unexplained import remaining
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.record import Record
 from models.registry import Array
@@ -87,6 +88,24 @@ def test_a_doubt_of_a_delay_says_nothing_for_the_alternatives_to_it(
     assert found.outcome == "partly"
     assert found.probability == pytest.approx(0.45)
     assert share_likeliest(found) == pytest.approx(share_likeliest(verdict))
+
+
+@pytest.mark.parametrize(
+    ("share", "fine", "told"), [(2.0, True, True), (0.5, True, False), (2.0, False, False)]
+)
+def test_an_error_of_one_reading_is_told_in_place_of_a_smaller_gap_of_the_smallest_kind(
+    share: float, fine: bool, told: bool, cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = cases.record(duration=8.0)
+    data = residuals.prepare(lab_b(whole), whole)
+    data = data.fine if fine else data
+    bare = fitting.at(data, {}, np.zeros(len(data.part.nuisances)))
+    verdict = PartVerdict(Search(data, bare, bare, ()), "unknown", 0.9, (), ())
+    own = OwnError("damper_stroke", share * remaining(bare), ("sensor.damper_stroke",))
+    for kind in (outliers, jumps, swaying):
+        monkeypatch.setattr(kind, "own_error", lambda *_: None)
+    monkeypatch.setattr(uneven_noise, "own_error", lambda *_: own)
+    assert by_itself(verdict, ()).own == (own if told else None)
 
 
 def test_readings_of_which_something_is_known_are_left_aside(cases: Cases) -> None:
