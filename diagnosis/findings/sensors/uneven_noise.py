@@ -181,8 +181,8 @@ def doubting(verdict: PartVerdict, part: LaboratoryPart, aside: Collection[str])
 def beside_effects(verdict: PartVerdict, loud: Collection[str]) -> tuple[PartVerdict, set[str]]:
     """The verdict on effects, and the readings, by signal, whose `loud` noise beside them follows the motion.
 
-    A sensor is as loud at rest as in motion, so that what looks like its noise is left by the effects, whose law is not
-    the true one: they explain a gap in part.
+    Few sensors are louder in motion than at rest. What looks like their noise is rather left by the effects, whose law
+    is not the true one: they explain a gap in part.
     """
     if not verdict.effects or not set(loud) & set(verdict.search.data.part.signals):
         return verdict, set()
