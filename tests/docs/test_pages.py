@@ -63,6 +63,8 @@ UNRUN = {
         "rths blind --set unlisted_tune --seed 1 --cases 35 --duration 12",
         "rths blind --predict --cases 24 --seed 21 --only catalogue,formula,unknown --duration 20",
         "rths blind --predict --set materials --cases 8 --seed 3 --duration 20",
+        "rths blind --predict --cases 22 --seed 9118 --only catalogue,formula,unknown --duration 12",
+        "rths blind --predict --cases 40 --seed 9333 --only catalogue,formula,unknown --duration 12",
         "rths blind --set loggers --cases 90 --seed 17 -o runs/loggers",
         "rths blind --set tune --seed 5101 --cases 50 --duration 12 --only catalogue,formula,pair,unknown -o runs/tune",
         "rths blind --set normal --seed 5104 --cases 36 --duration 12 --only catalogue,formula,pair,unknown "
