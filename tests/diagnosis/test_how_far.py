@@ -13,7 +13,8 @@ import pytest
 from common.recording.reader import read
 from common.roles import MASTER
 from diagnosis.diagnose import examine
-from diagnosis.findings import gaps, how_far, where
+from diagnosis.findings import gaps, how_far, report, where
+from diagnosis.findings.certainty import trust
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sites.shares import shares
 from diagnosis.findings.where import SiteTrace
@@ -289,3 +290,15 @@ def test_effects_that_hardly_change_the_response_are_judged_by_readings(
         response = how_far.judge(found, ())
         assert how_far.NOT_SHOWN in response.warnings
         assert response.how_far.closed == pytest.approx(1.0, abs=0.1)
+
+
+def test_names_beside_which_the_response_stays_open_have_the_probability_of_a_partial_verdict(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = examine(cases.record(FOUND["column"]))
+    closing = report.build(found, ()).report
+    monkeypatch.setattr(how_far, "shrinks", lambda *_: False)
+    open_ = report.build(found, ()).report
+    assert (closing.status, open_.status) == ("explained", "partly_explained")
+    assert open_.which[0].probability == trust.PARTLY.probability(trust.signs(found))
+    assert (closing.which[0].probability or 0.0) > 0.9

@@ -12,6 +12,7 @@ from common.roles import MASTER
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.laws import best
 from diagnosis.fits.laws.afresh import afresh
 from diagnosis.fits.laws.best import in_best_laws, under_the_first
 from diagnosis.fits.laws.specimen import follow, path
@@ -316,3 +317,15 @@ def test_a_law_that_is_nearly_the_first_one_leads_back_to_it(
     led = under_the_first(fitting.fit(data, {"column.pinching": begun}))
     assert ("law" not in led.values["column.pinching"]) is first
     assert led.chi < 1.2 * led.reduced.size
+
+
+def test_the_search_leads_back_to_the_first_law(cases: Cases, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = cases.record({"column.pinching": PINCHED}, duration=STRONGEST)
+    data = residuals.prepare(lab_a(whole), whole)
+    with_tails = fitting.at(
+        data, {"column.pinching": PINCHED | {"tails": 20.0, "law": 1.0}}, np.zeros(len(data.part.nuisances))
+    )
+    monkeypatch.setattr(best, "whole", lambda _: False)
+    monkeypatch.setattr(best, "raced", lambda *_, **__: {})
+    (found,) = in_best_laws([with_tails])
+    assert "law" not in found.values["column.pinching"]
