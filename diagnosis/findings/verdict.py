@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.plan.kinds import COLUMN
 from diagnosis.findings.sensors.one_motion import one_motion, one_place
-from diagnosis.findings.sensors.own_reading import errors, gives_energy, machine_alone
+from diagnosis.findings.sensors.own_reading import errors, gives_energy, machine_alone, of_column
 from diagnosis.findings.sensors.slow_noise import under_less_noise
 from diagnosis.findings.sites.likely import APART, REST, ranked
 from diagnosis.findings.sites.signatures import laboratory_of
@@ -158,17 +157,10 @@ def specimen_of_several(search: Search) -> str:
     Each of its effects is a force that follows from one motion, as is the law of any specimen that the catalogue lacks:
     two of them together imitate it.
     """
-    data, part = search.data, laboratory_of(search.data.part)
-    if part is None or part.lab.kind.name != COLUMN:
-        return ""
-    specimen = part.lab.site(part.lab.kind.sites[1])
-    own = [
-        data.catalogue[name].apply(data.system, **given)
-        for name, given in search.chosen.values.items()
-        if data.catalogue[name].site == specimen
-    ]
-    laws = any(system.effects != data.system.effects for system in own)
-    return specimen if len(own) > 1 and laws else ""
+    data, (site, values) = search.data, of_column(search.chosen)
+    laid = [data.catalogue[name].apply(data.system, **given) for name, given in values.items()]
+    laws = any(system.effects != data.system.effects for system in laid)
+    return site if len(laid) > 1 and laws else ""
 
 
 def odds(search: Search) -> list[float]:

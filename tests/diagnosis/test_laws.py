@@ -41,6 +41,8 @@ from tests.diagnosis.specimens import (
     swelling,
 )
 
+PINCHED = {"factor": 0.4144, "hardening": 0.2474, "width": 2.7e-3}
+
 
 def first_law(part: Part | None = None) -> Fit:
     values = {"yield_displacement": 1e-3, "hardening": 0.1, "exponent": 2.0}
@@ -301,9 +303,6 @@ def test_an_effect_whose_left_out_shape_does_what_a_second_effect_does_stands_al
     (one,) = alone(both)
     assert one.names == ("column.pinching",)
     assert simplest([both, one])[0] is one
-
-
-PINCHED = {"factor": 0.4144, "hardening": 0.2474, "width": 2.7e-3}
 
 
 @pytest.mark.parametrize(("tails", "first"), [(None, True), (0.5, False)])

@@ -19,6 +19,7 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search
 from diagnosis.recorded.parts import Building, LaboratoryPart
+from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE, checked, lay
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_a, lab_b, white
@@ -29,6 +30,14 @@ SECONDS = 8.0
 def softer(values: Array) -> Array:
     """Values that are smaller the larger they are, by a fifth at most."""
     return values * (1.0 - 0.2 * (values / np.max(np.abs(values))) ** 2)
+
+
+def predicted(cases: Cases, lab: Callable[[Record], LaboratoryPart]) -> tuple[LaboratoryPart, Data, Array]:
+    """A laboratory of a test without effects, its data, and what its readings are predicted to be (ticks, signals)."""
+    whole = cases.record(duration=SECONDS)
+    part = lab(whole)
+    data = residuals.prepare(part, whole)
+    return part, data, part.predict(data.system)
 
 
 def commanded(part: LaboratoryPart, number: int, change: Callable[[Array], Array]) -> LaboratoryPart:
@@ -71,10 +80,7 @@ def test_an_unknown_effect_of_a_machine_changes_the_readings_downstream(cases: C
     "name", ["sensor.table_displacement", "sensor.table_acceleration", "sensor.damper_force"]
 )
 def test_an_unknown_error_of_a_reading_changes_that_alone(cases: Cases, name: str) -> None:
-    whole = cases.record(duration=SECONDS)
-    part = lab_b(whole)
-    data = residuals.prepare(part, whole)
-    truth = part.predict(data.system)
+    part, data, truth = predicted(cases, lab_b)
     place = part.signals.index(name.removeprefix("sensor."))
     truth[:, place] = softer(truth[:, place])
     fit = judged(part, data, truth)
@@ -105,20 +111,14 @@ def bent_by(values: Array, share: float) -> Array:
 
 
 def test_a_wire_that_is_not_along_the_stroke_lies_at_its_sensor(cases: Cases) -> None:
-    whole = cases.record(duration=SECONDS)
-    part = lab_b(whole)
-    data = residuals.prepare(part, whole)
-    truth = part.predict(data.system)
+    part, data, truth = predicted(cases, lab_b)
     stroke = part.signals.index("damper_stroke")
     truth[:, stroke] += bent_by(truth[:, stroke], 4e-4)
     assert likely_sites(judged(part, data, truth)) == ("sensor.damper_stroke",)
 
 
 def test_a_force_that_depends_on_the_stroke_lies_at_the_damper(cases: Cases) -> None:
-    whole = cases.record(duration=SECONDS)
-    part = lab_b(whole)
-    data = residuals.prepare(part, whole)
-    truth = part.predict(data.system)
+    part, data, truth = predicted(cases, lab_b)
     stroke = part.signals.index("damper_stroke")
     damper = data.system.plan.damper
     force = damper.stiffness * bent_by(truth[:, stroke], 2e-2)
@@ -151,19 +151,13 @@ def test_a_scale_that_bends_is_told_from_a_column_that_softens_by_the_column_s_d
 
 
 def test_a_force_that_depends_on_the_speed_lies_at_the_column(cases: Cases) -> None:
-    whole = cases.record(duration=SECONDS)
-    part = lab_a(whole)
-    data = residuals.prepare(part, whole)
-    truth = part.predict(data.system)
+    part, data, truth = predicted(cases, lab_a)
     truth[:, 1] += 1e-2 * np.std(truth[:, 1]) * np.tanh(np.gradient(truth[:, 0], 2e-3) / 5e-3)
     assert likely_sites(judged(part, data, truth)) == ("column",)
 
 
 def test_a_zero_that_drifts_lies_at_the_load_cell(cases: Cases) -> None:
-    whole = cases.record(duration=SECONDS)
-    part = lab_a(whole)
-    data = residuals.prepare(part, whole)
-    truth = part.predict(data.system)
+    part, data, truth = predicted(cases, lab_a)
     truth[:, 1] += 0.5 * data.white[1] * np.sin(np.linspace(0.0, np.pi, len(truth)))
     assert likely_sites(judged(part, data, truth))[0] == "sensor.column_force"
 
@@ -171,10 +165,7 @@ def test_a_zero_that_drifts_lies_at_the_load_cell(cases: Cases) -> None:
 def test_a_column_and_the_load_cell_behind_it_cannot_be_told_apart_by_what_follows_neither(
     cases: Cases,
 ) -> None:
-    whole = cases.record(duration=SECONDS)
-    part = lab_a(whole)
-    data = residuals.prepare(part, whole)
-    truth = part.predict(data.system)
+    part, data, truth = predicted(cases, lab_a)
     truth[:, 1] += 3.0 * data.white[1] * ripple(np.zeros(len(truth))) / 2e-4
     fit = judged(part, data, truth)
     assert likely_sites(fit) == ("column", "sensor.column_force")

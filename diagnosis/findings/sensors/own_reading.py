@@ -12,6 +12,7 @@ from diagnosis.findings.sites.likely import REST
 from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.fits import candidates, hypothesis, worth
 from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.search import Search
 
 # Share of the most energy that a specimen ever held, from which on it gave some that it never had: of steps in time and
@@ -49,6 +50,17 @@ def errors(fit: Fit) -> list[str]:
     ]
 
 
+def of_column(fit: Fit) -> tuple[str, Values]:
+    """The site of the column in a fit's laboratory, and the effects there; empty where the laboratory has no column."""
+    part = laboratory_of(fit.data.part)
+    if part is None or part.lab.kind.name != COLUMN:
+        return "", {}
+    site = part.lab.site("column")
+    return site, {
+        name: values for name, values in fit.values.items() if fit.data.catalogue[name].site == site
+    }
+
+
 def gives_energy(fit: Fit) -> str:
     """The effects of a fit with which a column gives more energy than it ever took, in words, empty for none.
 
@@ -56,11 +68,8 @@ def gives_energy(fit: Fit) -> str:
     specimen so.
     """
     data, part = fit.data, laboratory_of(fit.data.part)
-    if part is None or part.lab.kind.name != COLUMN:
-        return ""
-    site = part.lab.site("column")
-    own = {name: values for name, values in fit.values.items() if data.catalogue[name].site == site}
-    if not own:
+    _, own = of_column(fit)
+    if part is None or not own:
         return ""
     unfiltered = part.replaced(channels=(NOTHING_STATED,) * len(part.channels))
     displacement, force = unfiltered.predict(hypothesis.lay(data, fit.z, own).unread).T
