@@ -138,7 +138,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         datas.append(data)
         verdicts.append(verdict)
         late = late and logger.later(late, verdict, record)
-    held = readings.held(record, steps)
+    held = {} if record.static else readings.held(record, steps)  # a curve may stand still where it turns
     noisy = readings.findings(record, noise(verdicts, sharpest), rounded, steps, logged=late is not None)
     verdicts, noisy = machines_first(record, verdicts, noisy)
     loud = noise(verdicts, heard)

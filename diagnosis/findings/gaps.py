@@ -105,12 +105,23 @@ class RecordingGaps:
                 result[name] = gain * np.interp(ticks - delay, ticks, result[name])
         return result
 
-    def open(self, systems: Mapping[str, System]) -> Mapping[str, Array]:
-        """Each part's own prediction behind the logger, from what was recorded of its input."""
+    def nominal(self) -> Mapping[str, Array] | None:
+        """Response of the nominal models, without what a logger did to it."""
+        systems = self.record.systems
+        if self.loop is not None:
+            return self.loop.simulate(systems, linked=False)
+        return self._parted(systems)
+
+    def _parted(self, systems: Mapping[str, System]) -> dict[str, Array]:
+        """Each part's own prediction from what was recorded of its input."""
         result: dict[str, Array] = {}
         for part in self._parts:
             result |= dict(zip(part.signals, part.predict(systems[part.role]).T, strict=True))
-        return self.logged(result)
+        return result
+
+    def open(self, systems: Mapping[str, System]) -> Mapping[str, Array]:
+        """Each part's own prediction behind the logger, from what was recorded of its input."""
+        return self.logged(self._parted(systems))
 
     def gap(self, simulated: Mapping[str, Array] | None, mask: Mask | None = None) -> dict[str, float]:
         """Gap per response signal."""

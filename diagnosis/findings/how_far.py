@@ -65,10 +65,12 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
     record = found.record
     mask, where_judged = judging(found)
     own = RecordingGaps(found, record, mask)
-    nominal = bare(found, own)
+    nominal = own.nominal()
     before, after = own.signals(frozenset()), own.signals(None)
     floors = own.floor()
     gap_before, gap_after = own.gap(before), own.gap(after)
+    if not gap_after:
+        return unjudged()
     floor = overall({name: floors.get(name, 0.0) for name in gap_after})
     traces = all_traces(found)
     summary = HowFar(
@@ -99,6 +101,14 @@ def judge(found: Diagnosis, validation: Sequence[Record]) -> Response:
     )
 
 
+def unjudged() -> Response:
+    """What is said of a recording of which no signal was judged."""
+    nothing = HowFar(
+        before=None, after=None, closed=None, closed_interval=None, noise_floor=None, judged_on=None
+    )
+    return Response(Gap(signals={}, overall=None, overall_noise_floor=None), nothing, [], {}, (), (), (), ())
+
+
 def hardly_shown(found: Diagnosis, summary: HowFar, changed: float) -> bool:
     """Whether effects were named that the response of the test hardly shows beside its noise.
 
@@ -125,7 +135,8 @@ def shrinks(found: Diagnosis, far: HowFar) -> bool:
 def by_readings(own: RecordingGaps, summary: HowFar) -> HowFar:
     """How far the gap of the readings closes in the parts with effects, each replayed by itself."""
     plans = own.record.plans
-    known = [own.open(own.found.systems(frozenset(), plans)), own.open(own.found.systems(plans=plans))]
+    systems = (own.record.systems, own.found.systems(frozenset(), plans), own.found.systems(plans=plans))
+    nominal, *known = (own.open(one) for one in systems)
     names = [
         name
         for verdict in own.found.verdicts
@@ -141,11 +152,16 @@ def by_readings(own: RecordingGaps, summary: HowFar) -> HowFar:
         there = own.record.present[name] & own.mask
         recorded = own.record.signals[name][there]
         level = float(np.sqrt(np.mean(recorded**2)))
-        errors = [float(np.sqrt(np.mean((recorded - one[name][there]) ** 2))) / level for one in known]
+        errors = [
+            float(np.sqrt(np.mean((recorded - one[name][there]) ** 2))) / level for one in (nominal, *known)
+        ]
         rows.append((*errors, own.found.noise(name) / level))
-    before, after, floor = (float(np.sqrt(np.mean(np.square(column)))) for column in zip(*rows, strict=True))
+    bare, before, after, floor = (
+        float(np.sqrt(np.mean(np.square(column)))) for column in zip(*rows, strict=True)
+    )
     return replace(
         summary,
+        nominal=bare,
         before=before,
         after=after,
         closed=closed_share(before, after, floor),
@@ -191,22 +207,6 @@ def histories(
             )
         )
     return tuple(result)
-
-
-def bare(found: Diagnosis, own: RecordingGaps) -> Mapping[str, Array] | None:
-    """Response of the nominal models."""
-    if own.loop is not None:
-        return own.loop.simulate(own.record.systems, linked=False)
-    return {
-        name: series
-        for verdict in found.verdicts
-        if not verdict.search.data.part.exact
-        for name, series in zip(
-            verdict.search.data.part.signals,
-            verdict.search.data.part.predict(found.record.systems[verdict.search.data.part.role]).T,
-            strict=True,
-        )
-    }
 
 
 def gap_entry(
@@ -269,22 +269,24 @@ def closed_interval(
 
 def validated(found: Diagnosis, validation: Sequence[Record], own: HowFar) -> HowFar | None:
     """The same on other recordings of the laboratories, None where none of them holds a part that was judged."""
-    before, after, floor, alone = [], [], [], []
+    nominal, before, after, floor, alone = [], [], [], [], []
     for record in validation:
         gaps = RecordingGaps(found, record, np.ones(record.ticks, dtype=bool))
         if not gaps.judges:
             continue
         bare_, whole = gaps.signals(frozenset()), gaps.signals(None)
+        nominal.append(overall(gaps.gap(gaps.nominal())))
         before.append(overall(gaps.gap(bare_)))
         after.append(overall(gaps.gap(whole)))
         floor.append(overall(gaps.floor()))
         alone.append(closed_interval(gaps, bare_, whole, floor[-1]))
     if not before:
         return None
-    b, a, f = (float(np.mean(values)) for values in (before, after, floor))
+    n, b, a, f = (float(np.mean(values)) for values in (nominal, before, after, floor))
     spread = [closed_share(*item) for item in zip(before, after, floor, strict=True)]
     return replace(
         own,
+        nominal=n,
         before=b,
         after=a,
         closed=closed_share(b, a, f),

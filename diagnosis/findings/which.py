@@ -33,6 +33,8 @@ class Named(NamedTuple):
 
 def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Named:
     """The candidates, the verdict's with the probability `sure` at most, and warnings on the verdict's parameters."""
+    if not found.verdicts:
+        return Named((Candidate(effects=(), probability=None, parameters={}, held_out_score=None),), ())
     named = [verdict for verdict in found.verdicts if verdict.effects]
     effects = [name for verdict in named for name in verdict.effects]
     effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from common.errors import InputError
-from common.plan.plan import Plan
 from diagnosis.recorded.parts import Part
 from diagnosis.recorded.record import Record
 from models.registry import Array
@@ -78,7 +77,7 @@ def joined(part: Part, others: Sequence[Part], group: int) -> Part:
 def refuse_others(record: Record, others: Sequence[Record]) -> None:
     """Raise InputError if a further recording has other laboratories than the first."""
     for other in others:
-        found = differing(record.plan, other.plan)
+        found = differing(record, other)
         if found:
             raise InputError(
                 f"{other.run.path} does not have the laboratories of {record.run.path}, since their plans differ in "
@@ -86,7 +85,9 @@ def refuse_others(record: Record, others: Sequence[Record]) -> None:
             )
 
 
-def differing(one: Plan, other: Plan) -> list[str]:
-    """The tables of laboratories, and the interval, in which two plans differ."""
-    tables = [f"[{name}]" for name in OF_LABORATORIES if getattr(one, name) != getattr(other, name)]
-    return tables + (["test.interval"] if one.test.interval != other.test.interval else [])
+def differing(one: Record, other: Record) -> list[str]:
+    """The tables of laboratories, and the interval, in which two plans differ; static data have no interval."""
+    plans = one.plan, other.plan
+    found = [f"[{name}]" for name in OF_LABORATORIES if getattr(plans[0], name) != getattr(plans[1], name)]
+    timed = not (one.static or other.static)
+    return found + (["test.interval"] if timed and plans[0].test.interval != plans[1].test.interval else [])

@@ -33,6 +33,9 @@ from models.system import System
 
 MASTER_FIRST = ("master", "slave")
 SAME = 0.9  # share of the forces used that are values of a reading, from which on all are
+# s that a row of static data counts as, whatever the interval of the plan. Fits withhold blocks of a second, and static
+# tests have some hundred rows in a cycle.
+ROW = 0.01
 LEAST_TICKS = 50  # without which nothing is judged: 0.1 s at 2 ms, and fewer ticks than a correlation needs
 
 
@@ -106,7 +109,7 @@ class Record:
     @property
     def static(self) -> bool:
         """Whether its times have no meaning, since only the order of its rows was stated."""
-        return self.stated is not None and self.stated.static
+        return is_static(self.run)
 
     @cached_property
     def catalogue(self) -> dict[str, Effect]:
@@ -215,6 +218,8 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
     if chosen is None:
         raise InputError(f"{run.path} carries no plan: give the one that it was recorded under with --plan.")
     check_slaves(run, chosen)
+    if is_static(run):
+        chosen = replace(chosen, test=replace(chosen.test, interval=ROW))
     first = next(iter(holds(run.events, chosen.test.interval)), None)
     if first is not None:
         run = before(run, first.begun)
@@ -244,6 +249,12 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
         around = WholeTest(every, role, used_forces(whole, every, ticks))
     held = first.begun * chosen.test.interval if first is not None else None
     return Record(chosen, run, ticks, signals, present, ground, other, around, plans, labs, held)
+
+
+def is_static(run: Run) -> bool:
+    """Whether the times of a recording have no meaning, since only the order of its rows was stated."""
+    stated = imported(run)
+    return stated is not None and stated.static
 
 
 def used_forces(run: Run, plan: Plan, ticks: int) -> Array:

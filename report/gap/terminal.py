@@ -105,6 +105,8 @@ def placed(report: Report) -> bool:
 def which(report: Report) -> list[str]:
     """The foremost candidates with probability and parameters."""
     lines: list[str] = []
+    if report.status == "not_enough_data":
+        return row("which", "not determined")
     for item in wording.once(report.which)[:3]:
         found = wording.parameters(item)
         several = len(item.effects) > 1

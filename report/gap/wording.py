@@ -209,7 +209,8 @@ def of_part(entry: PartOfGap, likely: bool) -> str:
         return "its cause is not in the catalogue"
     if entry.outcome == "explained":
         return f"{effects(entry.effects)} explains it"
-    names, rest = effects(entry.effects), f"leaves {percent(entry.left)} of {percent(entry.gap)}"
+    open_ = (entry.left or 0.0) + (entry.learned or 0.0)  # what was learned of it has no name
+    names, rest = effects(entry.effects), f"leaves {percent(open_)} of {percent(entry.gap)}"
     return (
         f"{names} explains a part and {rest}"
         if likely

@@ -124,9 +124,9 @@ def test_the_gap_on_a_recording_of_other_laboratories_is_not_closed(cases: Cases
     assert far.closed < 0.0  # adding friction to laboratories without makes it worse
 
 
-def without_table_target(cases: Cases) -> record.Record:
+def without_table_target(cases: Cases, effects: Effects | None = None) -> record.Record:
     """A recording that holds no closed loop."""
-    run = read(cases.file(FOUND["damper"]))
+    run = read(cases.file(FOUND["damper"] if effects is None else effects))
     for topic in ("master", "slave"):
         run.columns[topic].pop("table_target", None)
     run.columns["master"].pop("displacement")
@@ -154,6 +154,15 @@ def test_without_a_loop_the_parts_are_judged_by_themselves(cases: Cases, looples
     judged = how_far.judge(loopless, [without_table_target(cases)])
     assert judged.how_far.judged_on == "other recordings"
     assert judged.how_far.plain()["closed"] > 0.9
+
+
+def test_the_nominal_gap_is_that_of_the_recordings_on_which_is_judged(
+    cases: Cases, loopless: Diagnosis
+) -> None:
+    own = how_far.judge(loopless, ()).how_far.plain()["nominal"]
+    clean = how_far.judge(loopless, [without_table_target(cases, {})]).how_far.plain()
+    assert clean["nominal"] < 0.5 * own
+    assert clean["nominal"] == pytest.approx(clean["before"], rel=0.2)
 
 
 def test_what_a_sensor_picks_up_is_a_part_of_the_noise_floor(loopless: Diagnosis, rubbing: Diagnosis) -> None:

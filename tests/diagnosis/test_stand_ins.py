@@ -334,6 +334,8 @@ def test_an_effect_that_is_hardly_the_cause_stands_in_for_it() -> None:
         wording.of_part(entry, likely=False)
         == "actuator delay may stand in for another cause and leaves 3.0 % of 10 %"
     )
+    learned = replace(entry, learned=0.025, left=0.005)  # of what the name leaves, which has none
+    assert wording.of_part(learned, likely=True) == wording.of_part(entry, likely=True)
 
 
 def test_an_unknown_effect_in_one_part_does_not_hide_the_name_of_another(

@@ -165,6 +165,7 @@ def test_a_recording_of_a_few_ticks_is_not_enough(
         report = checked(out)
         assert report["status"] == "not_enough_data"
         assert report["which"][0]["effects"] == []
+        assert report["which"][0]["probability"] is None
     assert "not enough data" in capsys.readouterr().out.lower()
 
 
