@@ -2,7 +2,8 @@
 
 A nominal model that is merely wrong is no slip: nobody plans a laboratory a hundred times too stiff, but it is easily
 forgotten that a data column is in millimetres. So only factors count that no wrong model has, and signs of readings
-whose shape is that of the prediction.
+whose shape is that of the prediction. A specimen with wide loops has another shape than its elastic model; but no
+specimen gives work to the machine that moves it, so that its sign is also wrong where it seems to.
 """
 
 from __future__ import annotations
@@ -25,6 +26,10 @@ ALIKE = 0.5  # correlation from which on two signals have the same shape: that o
 # correlation, negative, from which on a sign is wrong: sines 154° apart; less may be a wrong phase, or a mass that
 # bounces off a stop.
 OPPOSED = 0.9
+# Share of the work exchanged that a specimen seems to give, from which on its sign is wrong. Where its force runs
+# against its deformation a tenth does, which no delay of a spring's force makes there. Where it has another shape, as
+# that of friction, half does: the force of a spring would be late by 60° then.
+GIVEN, GIVEN_UNLIKE = 0.1, 0.5
 LONGEST_LAG = 0.1  # s, delay within which shapes are compared: several times that of actuators and filters
 ABOVE_NOISE = 10.0  # rms over the sensor's noise without which the shape of a reading is not compared
 USUAL = {1e3: "a factor of 1000", 1e2: "a factor of 100", 1e6: "a factor of a million"}
@@ -38,11 +43,17 @@ class ReadingSlip:
     signal: str
     commands: tuple[str, ...]
     factor: float  # reading over prediction, negative where it runs against it
+    given: float = 0.0  # share of the work exchanged that a specimen seems to give to what moves it
 
     @property
     def sentence(self) -> str:
         """What is wrong, and where to look."""
         names = " and ".join(self.commands)
+        if self.given > 0.0:
+            return (
+                f"'{self.signal}' gives work to what moves the specimen along {names}, which no specimen does: "
+                f"check the sign of its column and of {names}"
+            )
         if self.factor < 0.0 and not self.far:
             return (
                 f"'{self.signal}' has the opposite sign of what the plan predicts from {names}: "
@@ -80,7 +91,7 @@ def refuse_slips(record: Record, data: Path) -> None:
 
 def slips(record: Record) -> list[ReadingSlip]:
     """The slips of a recording, those of the largest factor first."""
-    found = [slip for lab in record.labs for slip in of_laboratory(record, lab)]
+    found = [slip for lab in record.labs for slip in (*of_laboratory(record, lab), *giving(record, lab))]
     return sorted(found, key=lambda slip: -abs(np.log(abs(slip.factor))))
 
 
@@ -102,6 +113,34 @@ def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[ReadingSl
         factor = compared(part.measured[:, place], predicted[:, place], lab.noise.get(name, 0.0), most)
         if factor is not None and (factor < 0.0 or not 1.0 / FAR < factor < FAR):
             yield ReadingSlip(name, commands, factor)
+
+
+def giving(record: Record, lab: RecordedLaboratory) -> Iterator[ReadingSlip]:
+    """The force of a specimen that seems to give work over its measured deformation."""
+    names = lab.signal(lab.kind.channels.position), lab.signal(lab.kind.channels.force)
+    if not any(machine.site == "column" for machine in lab.kind.machines(lab.plan)) or not record.has(*names):
+        return
+    there = record.present[names[0]] & record.present[names[1]]
+    motion, force = (record.signals[name][there] for name in names)
+    noise = [lab.noise.get(name, 0.0) for name in names]
+    if any(np.std(values) < ABOVE_NOISE * rms for values, rms in zip((motion, force), noise, strict=True)):
+        return
+    share = given(motion, force)
+    if share > 0.0:
+        yield ReadingSlip(names[1], names[:1], -1.0, share)
+
+
+def given(motion: Array, force: Array) -> float:
+    """The share of the work exchanged that a specimen gives, 0 where this may be a delay or chance."""
+    centred = force - np.mean(force)
+    work = 0.5 * (centred[1:] + centred[:-1]) * np.diff(motion)
+    exchanged = float(np.sum(np.abs(work)))
+    if exchanged == 0.0 or np.ptp(force) == 0.0:
+        return 0.0
+    share = -float(np.sum(work)) / exchanged
+    likeness = float(np.corrcoef(motion, force)[0, 1])
+    least = GIVEN if likeness <= -ALIKE else GIVEN_UNLIKE
+    return share if share >= least and likeness < ALIKE else 0.0
 
 
 def compared(measured: Array, predicted: Array, noise: float, most: int) -> float | None:

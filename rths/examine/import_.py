@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     cli.output_argument(parser, "FILE", "the recording to write", required=True)
     parser.add_argument(
-        "--as-is", action="store_true", help="import signals even where their unit or sign looks wrong"
+        "--as-is", action="store_true", help="import data even where a unit or a sign looks wrong"
     )
     cli.force_argument(parser)
     cli.json_argument(parser, "say what was written as JSON on standard output")
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
 
         mapping = load_map(args.map)
         table = tabular.read_table(args.data, mapping.form)
-        found = on_ticks(mapping, table, args.data)
+        found = on_ticks(mapping, table, args.data, as_is=args.as_is)
         with outputs.writing(args.output, args.force, inputs) as path:
             write(path, mapping, found, args.data.name, as_is=args.as_is)
             if not args.as_is:
@@ -78,6 +78,7 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: Tex
             "interpolated": found.interpolated,
             "link": "judged" if judged else UNJUDGED,
             "units": found.units,
+            "gaps": found.gaps,
             "text": form and form._asdict(),
         }
         say(json.dumps(report) + "\n")
@@ -95,6 +96,12 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: Tex
         say(f"units, from the row below the names: {', '.join(units)}\n")
     if found.interpolated:
         say(f"interpolated onto the ticks, and marked so: {', '.join(found.interpolated)}\n")
+    if found.gaps:
+        begin, end = max(found.gaps, key=lambda gap: gap[1] - gap[0])
+        more = f", and in {len(found.gaps) - 1} shorter gaps" if found.gaps[1:] else ""
+        say(
+            f"no rows from {begin:.6g} to {end:.6g} s{more}: straight lines stand there; start and stop leave it out\n"
+        )
     if mapping.plan.roles and not (judged or mapping.static):
         say(f"link: {UNJUDGED}\n")
 

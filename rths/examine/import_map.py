@@ -89,7 +89,8 @@ class ImportTable:
     """The keys of a map that hold for the whole file."""
 
     plan: str = key("file of the nominal models", default="")
-    time: str = key("column of the time, s", default="")
+    time: str = key("column of the time", default="")
+    time_unit: str = key("unit of that column", default="")
     rate: float = key("samples per second, instead of a column of time", default=0.0, above=0.0, unit="Hz")
     start: float = key("time in the data from which on it is read", default=0.0, unit="s")
     stop: float = key("time in the data up to which it is read", default=0.0, unit="s")
@@ -115,6 +116,11 @@ class ImportMap:
     def time(self) -> str:
         """The column of the time, empty where there is none."""
         return self.table.time
+
+    @property
+    def time_unit(self) -> str:
+        """The unit of the time column, empty where the map does not give it."""
+        return self.table.time_unit
 
     @property
     def rate(self) -> float:

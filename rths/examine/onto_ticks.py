@@ -12,11 +12,15 @@ import numpy.typing as npt
 from common.errors import InputError, PlanError
 from common.plan.schema import nearest
 from common.recording.imported import ImportedChannel
-from common.signals import FieldType, Signal
+from common.signals import TIME, FieldType, Signal
 from models.registry import Array
 from report.text.tabular import DataTable
 from rths.examine.import_map import ImportMap, SignalSource, in_unit, lab_signals
 
+# Distance of rows over the plan's interval, and the plan's interval over it, from which on the time has another unit:
+# milliseconds for seconds make 1000, while minutes make 60 and an oscilloscope has a hundred rows in an interval.
+FAR_APART, TOO_CLOSE = 90.0, 900.0
+GAP = 5.0  # usual distances of rows from which on rows are missing between two: those of a logger's clock differ less
 ON_TICKS = 1e-3  # of an interval, within which a row is on its tick: times in a text file are rounded to a microsecond
 
 
@@ -28,6 +32,7 @@ class OnTicks:
     values: dict[str, Array]  # by our name of the signal
     stated: dict[str, ImportedChannel]
     units: dict[str, str]  # taken from the file's row of units, by our name
+    gaps: tuple[tuple[float, float], ...] = ()  # s in the data's own time, between which rows are missing
 
     @property
     def interpolated(self) -> list[str]:
@@ -35,24 +40,29 @@ class OnTicks:
         return [name for name, row in self.stated.items() if row.interpolated]
 
 
-def on_ticks(mapping: ImportMap, table: DataTable, data: Path) -> OnTicks:
+def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = False) -> OnTicks:
     """The signals at the plan's interval, by linear interpolation; numbers of messages are held.
 
     Raises:
-        InputError: a column is missing or has a gap, its unit is of another quantity, or time does not increase.
+        InputError: a column is missing or has a gap, its unit is of another quantity, or time does not increase or,
+            unless `as_is`, has another unit.
     """
     theirs, rows = time_base(mapping, table, data)
     interval = mapping.plan.test.interval
+    gaps: tuple[tuple[float, float], ...] = ()
     if mapping.static:
         t = np.arange(theirs.size, dtype=np.float64) * interval
         theirs = t
     else:
+        if not as_is:
+            refuse_unit(mapping, theirs, data)
+        gaps = missing_rows(theirs)
         theirs = theirs - theirs[0]
         t = np.arange(int(np.floor(theirs[-1] / interval + 1e-9)) + 1, dtype=np.float64) * interval
     between = not stands_on(theirs, t, interval)
     rate = 0.0 if mapping.static or theirs.size < 2 else 1.0 / float(np.median(np.diff(theirs)))
     known = lab_signals(mapping.plan)
-    found = OnTicks(t, {}, {}, {})
+    found = OnTicks(t, {}, {}, {}, gaps)
     for name, source in mapping.signals.items():
         row = known[name][1]
         if source.value is not None:
@@ -73,6 +83,27 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path) -> OnTicks:
         found.values[name] = moved(theirs, values, t, row) if between else values[nearest_rows(theirs, t)]
         found.stated[name] = channel(source, row, rate, between=between)
     return found
+
+
+def refuse_unit(mapping: ImportMap, theirs: Array, data: Path) -> None:
+    """Raise InputError where the rows stand so far apart, or so close, that their time has another unit."""
+    interval = mapping.plan.test.interval
+    apart = float(np.median(np.diff(theirs)))
+    if 1.0 / TOO_CLOSE < apart / interval < FAR_APART:
+        return
+    what = "the unit of the time" if mapping.time else "the rate"
+    unit = ' (time_unit = "ms" says that it is in ms)' if mapping.time else ""
+    raise InputError(
+        f"{data}: its rows are {apart:.3g} s apart, and the plan's interval is {interval:.3g} s: check {what}{unit} "
+        "and the plan's interval; if they are right, import it with --as-is."
+    )
+
+
+def missing_rows(theirs: Array) -> tuple[tuple[float, float], ...]:
+    """The times, s, between which rows are missing."""
+    apart = np.diff(theirs)
+    places = np.flatnonzero(apart > GAP * np.median(apart))
+    return tuple((float(theirs[place]), float(theirs[place + 1])) for place in places)
 
 
 def stands_on(theirs: Array, t: Array, interval: float) -> bool:
@@ -122,7 +153,7 @@ def channel(source: SignalSource, row: Signal, rate: float, *, between: bool) ->
 def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, Any]:
     """Times of the rows that are read, s, and which rows those are; raises InputError where they do not increase."""
     counted = np.arange(length(mapping, table, data), dtype=np.float64) / (mapping.rate or 1.0)
-    t = pick(table, mapping.time, data) if mapping.time else counted
+    t = seconds(mapping, table, data) if mapping.time else counted
     bad = np.flatnonzero(~(np.diff(t) > 0.0))
     if not mapping.static and (bad.size or t.size < 2):
         row = int(bad[0]) + 2 if bad.size else t.size
@@ -137,6 +168,17 @@ def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, 
             f"{data}: fewer than two rows lie between start and stop; its times go from {t[0]:g} to {t[-1]:g} s."
         )
     return t[rows], rows
+
+
+def seconds(mapping: ImportMap, table: DataTable, data: Path) -> Array:
+    """The column of the time, s, by the map's unit or by that in the row below the column's name."""
+    unit = mapping.time_unit or table.units.get(mapping.time, "")
+    t = pick(table, mapping.time, data)
+    try:
+        return t * in_unit(unit, TIME, "time") if unit else t
+    except PlanError as error:
+        where = mapping.path if mapping.time_unit else data
+        raise InputError(f"{where}: {str(error).replace(' in [signals]', '')}") from None
 
 
 def length(mapping: ImportMap, table: DataTable, data: Path) -> int:

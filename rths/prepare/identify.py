@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from common.errors import InputError
-from common.roles import name_of
+from common.roles import MASTER, name_of
 from common.terminal import cli
 from common.terminal.printable import all_shown
 from common.terminal.telling import Tell
@@ -60,11 +60,12 @@ def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
     tell(f"column, model {args.fit}" if args.fit else "", 0, 0)
     models = [fitted(recording, args.fit)] if args.fit else []
     reports = []
-    for role in recording.roles:
-        view = recording.of(role)
+    roles = recording.roles or (MASTER,)
+    for role in roles:
+        view = recording.of(role) if recording.roles else recording
         tested = args.part or part_of(view)
         parts = possible(view) if tested in ("", "target") else [tested]
-        own = [part for part in parts if role == recording.roles[0] or part in OF_SLAVE]
+        own = [part for part in parts if role == roles[0] or part in OF_SLAVE]
         for part in own:
             tell(part, 0, 0)
             reports.append(identify(view, part) | named(part, role))
