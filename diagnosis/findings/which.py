@@ -21,6 +21,9 @@ from diagnosis.report.records import Candidate
 from diagnosis.report.values import Parameters, Value
 from laboratories.effects.effect import Effect
 
+LEAST_GAIN = (
+    1.0  # of -2 log likelihood that an alternative must explain: less is a standard error of a parameter
+)
 MOST_OTHERS = 5  # alternatives listed, the most probable ones: as many as a reader compares with the verdict
 
 
@@ -177,10 +180,12 @@ def seen(found: Diagnosis) -> dict[str, dict[str, Value]]:
 def alternatives(
     verdict: PartVerdict, effects: list[str], parameters: Parameters, probability: float
 ) -> list[Candidate]:
-    """Entries in which one part's effects are others."""
+    """Entries in which one part's effects are others that explain something."""
     rest = [name for name in effects if name not in verdict.effects]
     result = []
     for other, chance in verdict.others:
+        if other.names and not other.cost < verdict.search.commissioned.cost - LEAST_GAIN:
+            continue
         share = chance
         if verdict.effects and verdict.probability > 0.0:
             share = probability / verdict.probability * chance

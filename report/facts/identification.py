@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -79,11 +80,13 @@ def interval_of(run: Run) -> float:
 
 
 def plain(found: dict[str, Estimate]) -> dict[str, dict[str, Any]]:
-    """Estimates as plain values."""
-    return {
-        name: {"value": item.value, "low": item.low, "high": item.high, "unit": item.unit}
-        for name, item in found.items()
-    }
+    """Estimates as plain values; the ends of an interval are None where the motion does not determine it."""
+    result = {}
+    for name, item in found.items():
+        known = math.isfinite(item.low) and math.isfinite(item.high)
+        low, high = (item.low, item.high) if known else (None, None)
+        result[name] = {"value": item.value, "low": low, "high": high, "unit": item.unit}
+    return result
 
 
 def of_column(run: Run, _interval: float) -> dict[str, Any]:

@@ -130,7 +130,7 @@ def show(report: dict[str, Any]) -> None:
     rows = [["parameter", "value", "95 % interval", "unit", "by"]]
     for method, key in (("least squares", "parameters"), ("tangent", "tangent")):
         rows += [
-            [name, f"{item['value']:.6g}", f"{item['low']:.6g} to {item['high']:.6g}", item["unit"], method]
+            [name, f"{item['value']:.6g}", ends(item["low"], item["high"]), item["unit"], method]
             for name, item in report.get(key, {}).items()
         ]
     table(rows)
@@ -146,6 +146,11 @@ def show(report: dict[str, Any]) -> None:
         )
     if "cycles" in report:
         show_cycles(report["cycles"])
+
+
+def ends(low: float | None, high: float | None) -> str:
+    """An interval, in words where the motion does not determine the parameter."""
+    return "not determined" if low is None or high is None else f"{low:.6g} to {high:.6g}"
 
 
 def misfit(value: Any) -> str:

@@ -8,10 +8,12 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from diagnosis.findings import which
 from diagnosis.report import read
 from diagnosis.report.schema import schema
 from report.gap import page
@@ -132,3 +134,20 @@ def test_effects_that_could_not_have_appeared_are_listed_and_not_blamed(cases: C
     report = report_of(cases, "one")
     assert not set(report["not_exercised"]) & set(report["which"][0]["effects"])
     assert len(set(report["not_exercised"])) == len(report["not_exercised"])
+
+
+def test_an_alternative_that_explains_nothing_is_not_listed() -> None:
+    data = SimpleNamespace(catalogue={})
+    rivals = [
+        SimpleNamespace(names=(name,), cost=cost, values={}, data=data)
+        for name, cost in (("actuator.delay", 99.9), ("actuator.gain", 60.0))
+    ]
+    bare = SimpleNamespace(cost=100.0)
+    verdict = SimpleNamespace(
+        effects=("actuator.time_constant",),
+        probability=0.9,
+        others=[(rival, 0.05) for rival in rivals],
+        search=SimpleNamespace(commissioned=bare, chosen=SimpleNamespace(cost=20.0)),
+    )
+    found = which.alternatives(verdict, ["actuator.time_constant"], {}, 0.9)  # type: ignore[arg-type]
+    assert [item.effects for item in found] == [("actuator.gain",)]

@@ -156,6 +156,21 @@ def test_parts_are_identified_in_a_test_without_a_slave(
     assert part["nrmse"] < 0.01
 
 
+def test_a_parameter_that_the_motion_does_not_determine_has_no_interval(
+    bring: Any, call: Any, capsys: Any, tmp_path: Path
+) -> None:
+    columns = drive()
+    columns["y"] = np.r_[0.0, columns["u"][:-1]]  # reached within the interval: neither lag nor dead time
+    assert bring(columns, 'time = "t"', DRIVE) == 0
+    capsys.readouterr()
+    assert call("identify", tmp_path / "a.mcap", "--json") == 0
+    out = capsys.readouterr().out
+    assert "Infinity" not in out
+    assert json.loads(out)["parts"][0]["parameters"]["delay"]["low"] is None
+    assert call("identify", tmp_path / "a.mcap") == 0
+    assert "not determined" in capsys.readouterr().out
+
+
 def test_a_curve_of_too_few_rows_has_no_figures(bring: Any, call: Any, capsys: Any, tmp_path: Path) -> None:
     y, force = loops()
     assert bring({"y": y[:30], "f": force[:30]}, "static = true", LOOP) == 0
