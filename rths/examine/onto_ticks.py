@@ -63,6 +63,8 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
     rate = 0.0 if mapping.static or theirs.size < 2 else 1.0 / float(np.median(np.diff(theirs)))
     known = lab_signals(mapping.plan)
     found = OnTicks(t, {}, {}, {}, gaps)
+    if mapping.time and not mapping.time_unit and time_unit(mapping, table) not in ("", "s"):
+        found.units["time"] = time_unit(mapping, table)
     for name, source in mapping.signals.items():
         row = known[name][1]
         if source.value is not None:
@@ -171,14 +173,28 @@ def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, 
 
 
 def seconds(mapping: ImportMap, table: DataTable, data: Path) -> Array:
-    """The column of the time, s, by the map's unit or by that in the row below the column's name."""
-    unit = mapping.time_unit or table.units.get(mapping.time, "")
+    """The column of the time, s."""
     t = pick(table, mapping.time, data)
+    unit = time_unit(mapping, table)
     try:
         return t * in_unit(unit, TIME, "time") if unit else t
     except PlanError as error:
-        where = mapping.path if mapping.time_unit else data
-        raise InputError(f"{where}: {str(error).replace(' in [signals]', '')}") from None
+        raise InputError(f"{mapping.path}: {str(error).replace(' in [signals]', '')}") from None
+
+
+def time_unit(mapping: ImportMap, table: DataTable) -> str:
+    """The map's unit of the time, else that in the row below its name; empty for seconds.
+
+    What stands there may be a word such as sec, or a format. That it is not in seconds
+    then shows in how far rows are apart.
+    """
+    stated = mapping.time_unit
+    unit = stated or table.units.get(mapping.time, "")
+    try:
+        in_unit(unit or "s", TIME, "time")
+    except PlanError:
+        return stated
+    return unit
 
 
 def length(mapping: ImportMap, table: DataTable, data: Path) -> int:

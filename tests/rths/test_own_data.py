@@ -75,7 +75,7 @@ def test_a_time_in_milliseconds_is_refused_until_the_map_says_so(
     assert "'time' is in mm" in capsys.readouterr().err
 
 
-def test_a_row_of_units_holds_for_the_time_too(call: Any, tmp_path: Path) -> None:
+def test_a_row_of_units_holds_for_the_time_too(call: Any, capsys: Any, tmp_path: Path) -> None:
     rows = zip(*drive().values(), strict=True)
     text = "t,u,y\nms,mm,mm\n" + "\n".join(f"{1e3 * t:.3f},{u:.6f},{y:.6f}" for t, u, y in rows)
     (tmp_path / "a.csv").write_text(text + "\n")
@@ -84,6 +84,12 @@ def test_a_row_of_units_holds_for_the_time_too(call: Any, tmp_path: Path) -> Non
     out = tmp_path / "a.mcap"
     assert call("import", tmp_path / "a.csv", "--map", tmp_path / "map.toml", "-o", out) == 0
     assert read(out).columns["master"]["t"].size == 400
+    assert "units, from the row below the names: time in ms" in capsys.readouterr().out
+    (tmp_path / "a.csv").write_text(
+        text.replace("ms,mm,mm", "ticks,mm,mm") + "\n"
+    )  # no unit of time, so seconds
+    assert call("import", tmp_path / "a.csv", "--map", tmp_path / "map.toml", "-o", out, "--force") == 2
+    assert "its rows are 10 s apart" in capsys.readouterr().err
 
 
 def test_a_rate_far_from_the_plans_interval_is_imported_as_it_is(bring: Any, tmp_path: Path) -> None:
