@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.findings.sensors.one_motion import one_motion, one_place
 from diagnosis.findings.sensors.own_reading import errors, gives_energy, machine_alone, of_column
 from diagnosis.findings.sensors.slow_noise import under_less_noise
-from diagnosis.findings.sites.likely import APART, REST, ranked
+from diagnosis.findings.sites.likely import APART, REST, likely_sites, ranked
 from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit, at_end
@@ -282,11 +282,15 @@ def trifling(search: Search) -> bool:
 def misplaced(search: Search) -> bool:
     """Whether a single other site explains more of a gap than the effects named, by the readings that it changes.
 
-    An effect changes the readings of its site, so that one that only imitates the cause changes others.
+    An effect changes the readings of its site, so that one that only imitates the cause changes others. It is misplaced
+    as well where it changes the right reading as a machine does, and the gap is a function of what the sensor reads.
     """
     sites = {search.data.catalogue[name].site for name in search.chosen.names}
     found = ranked(search.commissioned)
     near = {item.site for item in found if item.cost < APART}
+    by_form = set(likely_sites(search.commissioned))
+    if all("sensor." in site for site in by_form):
+        near = by_form or near
     return bool(found) and not sites & near and found[0].left < 1.0 - search.explained
 
 

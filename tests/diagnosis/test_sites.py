@@ -188,6 +188,17 @@ def test_effects_elsewhere_that_explain_less_than_an_unknown_one_are_not_named(c
     )
 
 
+def test_a_force_of_the_damper_is_misplaced_where_the_gap_is_a_function_of_the_stroke_that_is_read(
+    cases: Cases,
+) -> None:
+    part, data, truth = predicted(cases, lab_b)
+    stroke = part.signals.index("damper_stroke")
+    truth[:, stroke] += bent_by(truth[:, stroke], 0.1)
+    bare = judged(part, data, truth)
+    imitation = {"damper.asymmetry": {"share": 0.1}}
+    assert misplaced(Search(data, bare, fitting.fit(data, imitation, bare.z), ()))
+
+
 def test_a_building_has_no_likely_sites(cases: Cases) -> None:
     whole = cases.record(duration=SECONDS)
     data = residuals.prepare(Building(whole), whole)
