@@ -180,6 +180,14 @@ class Kind(ABC):
         table, _, key = name.partition(".")
         return system.scaled(table, key, factor)
 
+    def between_ticks(self, system: System, effort: Array) -> Array | float:
+        """Means of the readings around each tick, less those of straight lines between ticks, (ticks, channels).
+
+        Zero where readings are straight enough. `effort` (ticks,) is the command of a motor (N), held between ticks. A
+        logger's filter, which averages over several ticks, shows these means.
+        """
+        return 0.0
+
     def noisy(self, system: System, rms: Mapping[str, float]) -> System:
         """The system with the noise of measured channels replaced."""
         return system.moved("sensors", **rms)

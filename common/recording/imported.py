@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 IMPORT = "import"  # metadata of an imported recording
 FILTERS = ("butterworth", "bessel")  # the low-pass filters usual before the converters of data loggers
+NODES = (-2, -1, 0, 1)  # ticks of the samples around one, through which a cubic goes
 Samples = NDArray[np.float64]
 
 
@@ -69,13 +70,16 @@ class LoggerFilter:
         return self.cutoff * poles, self.cutoff * weights
 
     def filtered(self, values: Samples, interval: float) -> Samples:
-        """A signal (ticks,) after the filter, linear between ticks and constant at its first value before them.
+        """A signal (ticks,) after the filter, smooth between ticks and constant at its first value before them.
 
+        Straight lines between ticks would take the share (ω·interval)²/12 of a wave of frequency ω away, which shows in
+        a reading that moves 10,000 times its noise; a twelfth of the second differences gives that back.
         Pole by pole, because the coefficients of a high order lose all digits where the cutoff is far below the rate.
         """
         from scipy import signal
 
         moved = values - values[0]
+        moved[1:-1] -= np.diff(moved, 2) / 12.0
         result = np.full(values.size, values[0], dtype=np.float64)
         for pole, weight in zip(*self.modes, strict=True):
             step = pole * interval
@@ -106,13 +110,15 @@ class ImportedChannel:
         above, below = (np.append(0.0, row)[-2:] / row[-1] for row in self.filter.transfer)
         return self.delay + float(below[0] - above[0])
 
+    def response(self, frequency: Samples) -> NDArray[np.complex128]:
+        """Frequency response of its filter and delay at `frequency` (Hz)."""
+        turned = np.exp(-2j * math.pi * self.delay * np.asarray(frequency))
+        return np.asarray(turned if self.filter is None else turned * self.filter.response(frequency))
+
     def through(self, values: Samples, interval: float) -> Samples:
         """True values (ticks,) as the logger would have recorded them without noise: after its filter and delay."""
         seen = self.filter.filtered(values, interval) if self.filter else values
-        if self.delay == 0.0:
-            return seen
-        ticks = np.arange(seen.size) * interval
-        return np.asarray(np.interp(ticks - self.delay, ticks, seen))
+        return seen if self.delay == 0.0 else later(seen, self.delay / interval)
 
 
 NOTHING_STATED = ImportedChannel()
@@ -165,6 +171,20 @@ def imported(run: Run) -> ImportedData | None:
         raise InputError(
             f"{run.path} is damaged: its metadata '{IMPORT}' cannot be read; import the data again."
         ) from None
+
+
+def later(values: Samples, ticks: float) -> Samples:
+    """A signal (n,) that comes so many ticks later, on cubics through four samples; its ends stay constant."""
+    whole = math.floor(ticks)
+    part = ticks - whole
+    weights = [
+        math.prod((-part - other) / (node - other) for other in NODES if other != node) for node in NODES
+    ]
+    ahead, behind = max(whole, 0) + 2, max(-whole, 0) + 1
+    padded = np.pad(values, (ahead, behind), mode="edge")
+    first = ahead - whole
+    columns = [padded[first + node : first + node + values.size] for node in NODES]
+    return np.asarray(np.tensordot(weights, columns, axes=1))
 
 
 def exchange_known(run: Run) -> bool:

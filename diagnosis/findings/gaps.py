@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from common.recording.imported import later
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import residuals
 from diagnosis.fits.worth import SEEN
@@ -98,11 +99,11 @@ class RecordingGaps:
         """Simulated readings as the logger that was found has them: late, and with its gain."""
         if self.record.stated is None:
             return simulated
-        ticks = np.arange(self.record.ticks) * self.record.plan.test.interval
+        interval = self.record.plan.test.interval
         result = dict(simulated)
         for name, (delay, gain) in self.found.logger.items():
             if name in result:
-                result[name] = gain * np.interp(ticks - delay, ticks, result[name])
+                result[name] = gain * later(result[name], delay / interval)
         return result
 
     def nominal(self) -> Mapping[str, Array] | None:

@@ -191,6 +191,9 @@ class LaboratoryPart:
         drive = [self.inputs.get(name, none) for name in self.devices]
         drive += [none] * (2 - len(drive))
         found = replay.read(self.lab.kind, system, self.motion(system.unread, drive))
+        passed = [channel.filter is not None for channel in self.channels]
+        if any(passed):
+            found += np.where(passed, self.lab.kind.between_ticks(system, drive[1]), 0.0)
         for place, channel in enumerate(self.channels):
             if channel.filter is not None or channel.delay != 0.0:
                 found[:, place] = channel.through(found[:, place], self._interval)

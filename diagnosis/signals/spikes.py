@@ -33,14 +33,17 @@ def deviation(apart: Array) -> Array:
 
 
 def beyond(residual: Array) -> Array:
-    """How far (n,) each sample of a residual is from the median of its neighbours."""
-    return np.asarray(np.abs(residual - ndimage.median_filter(residual, NEIGHBOURS, mode="nearest")))
+    """How far (n,) each sample of a residual is from the median of its neighbours.
+
+    Beyond its ends the residual is mirrored without its last sample, so that a spike there is no neighbour of its own.
+    """
+    return np.asarray(np.abs(residual - ndimage.median_filter(residual, NEIGHBOURS, mode="mirror")))
 
 
 def spikes(residual: Array) -> Mask:
     """Where a residual (n,) has spikes: at most `LONGEST` samples in a row far from the median around them."""
     apart = beyond(residual)
-    slowly = np.abs(residual - ndimage.median_filter(residual, WIDER, mode="nearest"))
+    slowly = np.abs(residual - ndimage.median_filter(residual, WIDER, mode="mirror"))
     sharp, wide = deviation(apart), deviation(slowly)
     above = (apart > BEYOND * sharp) & (apart > AS_MUCH * wide) & (sharp > 0.0)
     labels, count = ndimage.label(above)

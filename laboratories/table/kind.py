@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import ClassVar
 
+import numpy as np
+
 from common.plan.laboratory_tables import ForceCorrection
 from common.plan.plan import Plan
 from common.signals import TABLE_CHANNELS
@@ -22,7 +24,7 @@ from laboratories.kind import (
     Pictured,
     Sensed,
 )
-from laboratories.table import linear, model
+from laboratories.table import linear, model, motor
 from laboratories.table.descent import TableRamp
 from laboratories.table.record import TableLab
 from models.compiled import bound
@@ -80,6 +82,13 @@ class TableKind(Kind):
         """Set the damper's stroke (m) and its rate (m/s)."""
         lab.state[linear.STROKE], lab.state[linear.STROKE_RATE] = motion, rate
         truth[self.channels.names.index(self.free)] = motion
+
+    def between_ticks(self, system: System, effort: Array) -> Array:
+        """Of the damper's force, which the motor's force bends after each step of its command, (ticks, channels)."""
+        result = np.zeros((effort.size, len(self.channels.names)))
+        force = self.channels.names.index(self.channels.force)
+        result[:, force] = -motor.bend(system, effort)
+        return result
 
     def drifts(self, plan: Plan) -> bool:
         """Whether the damper has no spring."""

@@ -123,12 +123,7 @@ def of_column(system: System, s: Spectrum) -> list[Way]:
 def passed(part: LaboratoryPart, frequencies: Array) -> Spectrum:
     """What the filters and delays stated for the recording's channels do to the readings, (frequencies, signals)."""
     result = np.ones((frequencies.size, len(part.signals)), dtype=np.complex128)
-    interval = part.lab.plan.test.interval
     for place, channel in enumerate(part.channels):
         if channel.filter is not None or channel.delay != 0.0:
-            impulse = np.zeros(len(part.measured))
-            impulse[0] = 1.0
-            response = np.fft.rfft(channel.through(impulse, interval))
-            lines = np.fft.rfftfreq(impulse.size, interval)
-            result[:, place] = np.interp(frequencies, lines, response)
+            result[:, place] = channel.response(frequencies)
     return result

@@ -42,12 +42,8 @@ class LoopResponse(Measured):
         self._lines = (frequencies > LOWEST) & (frequencies < min(HIGHEST, AT_TICKS / interval))
         self._s = np.asarray(2j * np.pi * frequencies[self._lines], dtype=np.complex128)
         command = self.spectrum(part.inputs[next(iter(part.inputs))])
-        first = np.zeros(ticks)
-        first[0] = 1.0
-        self._commands = [
-            command * np.fft.rfft(part.channels[place].through(first, interval))[self._lines]
-            for place in places
-        ]
+        passed = frequencies[self._lines]
+        self._commands = [command * part.channels[place].response(passed) for place in places]
         self.measured = np.stack([apart(self.spectrum(part.measured[:, place])) for place in places], axis=1)
         self.present: Mask = np.ones(self.measured.shape, dtype=bool)
 
