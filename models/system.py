@@ -170,6 +170,9 @@ class SensorEffects:
     delay: float = 0.0  # s
     saturation: float = math.inf  # level that no reading exceeds, bias aside
     saturation_sharpness: float = 2.0  # n of x/(1 + |x/level|ⁿ)^(1/n)
+    # s by which a data logger recorded the reading later than its map states, less than zero for earlier; no
+    # laboratory has it
+    logger_delay: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -254,4 +257,4 @@ class System:
         """The system of which a logger records one reading, with its sensor's errors, late (s) and times a gain."""
         own = self.effects.sensors.get(signal, SensorEffects())
         values = {name: gain * getattr(own, name) for name in ("gain", "bias", "drift", "saturation")}
-        return self.sensed(signal, delay=own.delay + delay, **values)
+        return self.sensed(signal, logger_delay=own.logger_delay + delay, **values)

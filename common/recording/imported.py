@@ -115,10 +115,14 @@ class ImportedChannel:
         turned = np.exp(-2j * math.pi * self.delay * np.asarray(frequency))
         return np.asarray(turned if self.filter is None else turned * self.filter.response(frequency))
 
-    def through(self, values: Samples, interval: float) -> Samples:
-        """True values (ticks,) as the logger would have recorded them without noise: after its filter and delay."""
+    def through(self, values: Samples, interval: float, more: float = 0.0) -> Samples:
+        """True values (ticks,) as the logger would have recorded them without noise: after its filter and delay.
+
+        They come `more` s later than stated.
+        """
         seen = self.filter.filtered(values, interval) if self.filter else values
-        return seen if self.delay == 0.0 else later(seen, self.delay / interval)
+        late = self.delay + more
+        return seen if late == 0.0 else later(seen, late / interval)
 
 
 NOTHING_STATED = ImportedChannel()

@@ -18,7 +18,8 @@ from common.roles import MASTER
 from diagnosis.fits.evidence import BEYOND
 from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.logged_building import LoggedBuilding
-from diagnosis.recorded.parts import ALIKE, Building, LaboratoryPart, Part
+from diagnosis.recorded.nuisances import ALIKE
+from diagnosis.recorded.parts import Building, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Delay, Late, Record
 from diagnosis.signals import low_pass
 from diagnosis.signals.low_pass import ReadSpectra

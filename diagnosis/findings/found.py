@@ -84,7 +84,7 @@ class Diagnosis:
                 system = nuisance.moved(system, float(place)) if nuisance.of_record else system
             for name in part.lab.kind.channels.names:
                 if made := system.effects.sensors.get(name):
-                    result[part.lab.signal(name)] = made.delay, made.gain
+                    result[part.lab.signal(name)] = made.logger_delay, made.gain
         return result
 
     def corrected(self, plans: Mapping[str, Plan] | None = None, of: Of = "law") -> dict[str, System]:

@@ -17,7 +17,8 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.logged_building import LoggedBuilding
-from diagnosis.recorded.parts import ALIKE, LATE, LaboratoryPart, Part
+from diagnosis.recorded.nuisances import ALIKE, LATE
+from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, NOT_LATE, Delay, Late, Record
 from diagnosis.signals import clock
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from diagnosis.recorded.nuisances import LoggedForce
-from diagnosis.recorded.parts import ALIKE, CALIBRATED, LATE, UNLIKE, Building
+from diagnosis.recorded.nuisances import ALIKE, CALIBRATED, LATE, UNLIKE, LoggedForce
+from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Delay
 from diagnosis.signals import alike
 from diagnosis.signals.earlier import earlier
@@ -141,7 +141,7 @@ class LoggedBuilding(Building):
     def logger(self, system: System) -> tuple[float, float]:
         """Delay (s) and gain of the logger in a hypothesis."""
         made = system.effects.sensors.get(self._force)
-        return (made.delay, made.gain) if made else (self.about, 1.0)
+        return (made.logger_delay, made.gain) if made else (self.about, 1.0)
 
     def rounded(self, steps: Mapping[str, float]) -> dict[str, float]:
         """The step of the balance where the force is rounded to one of `steps`, by signal."""

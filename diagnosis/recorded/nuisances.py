@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,8 +12,21 @@ import numpy as np
 from common.plan.plan import Plan
 from common.recording.imported import NOTHING_STATED, ImportedChannel, ImportedData
 from diagnosis.recorded.laboratory import RecordedLaboratory
-from diagnosis.recorded.record import Record
+from diagnosis.recorded.record import Late, Record
 from models.system import System
+
+# Standard deviations within which a logger's channels are expected. LATE: a filter of 40 Hz, usual before sampling at
+# 100 Hz to 200 Hz, delays by 4 ms. ALIKE and UNLIKE: channels of one logger differ by a quarter of an interval or by
+# half of their delay, so that a channel without delay is two tolerances off. CALIBRATED: load cells and displacement
+# transducers are calibrated to a percent.
+LATE = 4e-3  # s
+ALIKE = 5e-4  # s
+UNLIKE = 0.5
+CALIBRATED = 0.01
+# Standard deviation of the delay of a stated filter. PASSING: an analogue filter's parts are good to some per cent, and
+# a digital one that loses 3 dB at the same frequency, 100 Hz sampled at 500 Hz, delays slow motion by 13 % less.
+# BETWEEN: what readings do between ticks, as after the steps of a command, is known no better.
+PASSING, BETWEEN = 0.1, 5e-5  # share, s
 
 
 @dataclass(frozen=True)
@@ -82,18 +97,22 @@ class LoggedForce(Nuisance):
 
 @dataclass(frozen=True)
 class LoggedReadings(Nuisance):
-    """Delay (s), about the one found elsewhere, or gain with which a logger recorded readings of a laboratory."""
+    """Delay (s), about the one found elsewhere, or gain with which a logger recorded readings of a laboratory.
+
+    A logger whose filter is stated may delay by less than that, one of which nothing is stated by no less than nothing.
+    """
 
     of_record = True
     signals: tuple[str, ...] = ()  # of the readings in their laboratory
     about: float = 0.0  # s, the delay at z = 0
+    least: float = 0.0  # s, of the delay
 
     def moved(self, system: System, z: float) -> System:
-        """The system whose readings have that gain, or that delay, which is never negative."""
+        """The system whose readings have that gain, or that delay."""
         if self.parameter == "gain":
             values = {"gain": 1.0 + z * self.tolerance}
         else:
-            values = {"delay": max(0.0, self.about + z * self.tolerance)}
+            values = {"delay": max(self.least, self.about + z * self.tolerance)}
         if values in ({"gain": 1.0}, {"delay": 0.0}):
             return system
         for name in self.signals:
@@ -141,6 +160,32 @@ def channels(stated: ImportedData | None, lab: RecordedLaboratory) -> tuple[Impo
     if stated is None:
         return (NOTHING_STATED,) * len(lab.measured)
     return tuple(stated.channel(lab.role, name) for name in lab.kind.channels.names)
+
+
+def of_logger(lab: RecordedLaboratory, late: Late, spread: float | None) -> tuple[LoggedReadings, ...]:
+    """Delays of force readings and of the others by a logger of which nothing is stated, about those found elsewhere.
+
+    `spread` is their standard deviation, s; None for what is usual.
+    """
+    rows, groups = lab.kind.channels.measured, ((late.force, True), (late.motion, False))
+    return tuple(
+        LoggedReadings("delay", spread or math.hypot(max(ALIKE, UNLIKE * about), unsure), lab, those, about)
+        for (about, unsure), force in groups
+        if (those := tuple(row.name for row in rows if (row.unit == "N") == force))
+    )
+
+
+def of_filters(lab: RecordedLaboratory, stated: Sequence[ImportedChannel]) -> tuple[LoggedReadings, ...]:
+    """By how much forces, and other readings, of which a filter is stated are late beyond that and their delay."""
+    result = []
+    for force in (True, False):
+        rows = zip(lab.kind.channels.measured, stated, strict=True)
+        those = {row.name: one.filter for row, one in rows if one.filter and (row.unit == "N") == force}
+        if those:
+            late = max(ImportedChannel(one).late for one in those.values())
+            known = math.hypot(PASSING * late, BETWEEN)
+            result.append(LoggedReadings("delay", known, lab, tuple(those), least=-late))
+    return tuple(result)
 
 
 def nothing_stated(mapped: ImportedData | None, lab: RecordedLaboratory) -> bool:

@@ -7,7 +7,6 @@ readings by the sensors' noise alone, and a gap in one part does not enter anoth
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Collection
 from typing import Any, Protocol
 
@@ -18,6 +17,7 @@ from common.recording.imported import ImportedData
 from common.roles import MASTER
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import (
+    CALIBRATED,
     LoggedReadings,
     Nuisance,
     calibrations,
@@ -25,6 +25,8 @@ from diagnosis.recorded.nuisances import (
     nothing_stated,
     nuisances,
     of_building,
+    of_filters,
+    of_logger,
 )
 from diagnosis.recorded.record import Late, Record
 from diagnosis.signals import pieces
@@ -48,14 +50,6 @@ PLAYED, NUMBERS = 8, 4_000_000
 # Difference of two good solutions of one model over a measured signal's rms; nothing below is a gap where effects are
 # named. The second is of two very good ones: solved in steps of 0.1 ms they differ by 1e-6 and less.
 MODEL_ERROR, FINE_ERROR = 1e-3, 2e-5
-# Standard deviations within which a logger's channels are expected. LATE: a filter of 40 Hz, usual before sampling at
-# 100 Hz to 200 Hz, delays by 4 ms. ALIKE and UNLIKE: channels of one logger differ by a quarter of an interval or by
-# half of their delay, so that a channel without delay is two tolerances off. CALIBRATED: load cells and displacement
-# transducers are calibrated to a percent.
-LATE = 4e-3  # s
-ALIKE = 5e-4  # s
-UNLIKE = 0.5
-CALIBRATED = 0.01
 
 
 class Part(Protocol):
@@ -194,9 +188,12 @@ class LaboratoryPart:
         passed = [channel.filter is not None for channel in self.channels]
         if any(passed):
             found += np.where(passed, self.lab.kind.between_ticks(system, drive[1]), 0.0)
-        for place, channel in enumerate(self.channels):
-            if channel.filter is not None or channel.delay != 0.0:
-                found[:, place] = channel.through(found[:, place], self._interval)
+        for place, (name, channel) in enumerate(
+            zip(self.lab.kind.channels.names, self.channels, strict=True)
+        ):
+            more = made.logger_delay if (made := system.effects.sensors.get(name)) else 0.0
+            if channel.filter is not None or channel.delay + more != 0.0:
+                found[:, place] = channel.through(found[:, place], self._interval, more)
         if self.freed >= 0:
             found[:, self.freed] += self.begun_elsewhere(self.measured[:, self.freed] - found[:, self.freed])
         return found
@@ -276,18 +273,10 @@ class LaboratoryPart:
         """The same laboratory with readings from a logger that delayed forces and other channels.
 
         What a logger does to one channel it mostly does to all, to forces as to the others, which have amplifiers of
-        their own; `spread` is the standard deviation of their delays, s. Where a delay, a filter or a calibration is
-        stated for a channel, that is not changed.
+        their own; `spread` is the standard deviation of their delays, s. Where a delay or a calibration is stated for a
+        channel, that is not changed; a filter that is stated is known to a tenth of its delay.
         """
-        rows = self.lab.kind.channels.measured
-        groups = ((late.force, True), (late.motion, False)) if self.free else ()
-        delays = tuple(
-            LoggedReadings(
-                "delay", spread or math.hypot(max(ALIKE, UNLIKE * about), unsure), self.lab, those, about
-            )
-            for (about, unsure), force in groups
-            if (those := tuple(row.name for row in rows if (row.unit == "N") == force))
-        )
+        delays = of_logger(self.lab, late, spread) if self.free else of_filters(self.lab, self.channels)
         if any(channel.calibration > 0.0 for channel in self.channels):
             return self.replaced(nuisances=(*self.nuisances, *delays))
         gain = LoggedReadings("gain", CALIBRATED, self.lab, self.lab.kind.channels.names)

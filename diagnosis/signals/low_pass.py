@@ -105,7 +105,7 @@ class Unlike(NamedTuple):
 
 def behind(of: ReadSpectra, channel: ImportedChannel, free: int | None = None) -> Unlike:
     """What is left of readings behind a filter or delay, at the best parameters, of which one may be `free`."""
-    passed = response(channel, of.frequency, of.interval)[:, None]
+    passed = channel.response(of.frequency)[:, None]
     left, slopes = of.read - passed * of.true, passed[:, :, None] * of.slopes
     least, most = SMALLEST**2 * means(of, of.read), highest(of)
     known = np.arange(of.slopes.shape[2]) != free
@@ -127,20 +127,6 @@ def weighed(of: ReadSpectra, left: Unlike) -> float:
     """−2·log of the probability of what is left, and of the parameters."""
     level = np.minimum(left.level, highest(of))
     return 2.0 * OWN * float(np.sum(counts(of) @ np.log(level))) + left.prior
-
-
-def response(channel: ImportedChannel, frequency: Array, interval: float) -> Lines:
-    """What `ImportedChannel.through` makes of each frequency (Hz), on straight lines between ticks."""
-    turns = np.exp(-2j * np.pi * frequency * channel.delay)
-    if channel.filter is None:
-        return turns
-    back = np.exp(-2j * np.pi * frequency * interval)
-    poles, weights = (np.concatenate([one, one.conj()]) for one in channel.filter.modes)
-    steps = poles * interval
-    kept = np.exp(steps)
-    ramps = 0.5 * weights / (poles * steps)
-    now, before = ramps * (np.expm1(steps) - steps), ramps * (1.0 + kept * (steps - 1.0))
-    return turns * sum((n + b * back) / (1.0 - k * back) for n, b, k in zip(now, before, kept, strict=True))
 
 
 def likelier_whole(of: ReadSpectra, less: ReadSpectra) -> float:

@@ -17,6 +17,7 @@ from common.recording.imported import (
     LoggerFilter,
     exchange_known,
     imported,
+    later,
 )
 from common.recording.run import Run
 
@@ -64,6 +65,32 @@ def test_a_filter_far_below_the_rate_keeps_its_digits(kind: str, order: int) -> 
     turned = low_pass.response(np.array([2.0]))[0] * np.exp(4j * math.pi * t[10_000:])
     assert seen == pytest.approx(turned.imag, abs=1e-4)
     assert low_pass.filtered(np.r_[0.0, np.ones(12_000)], interval)[-1] == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["butterworth", "bessel"])
+def test_a_filter_takes_nothing_more_away_than_an_analogue_one(kind: str) -> None:
+    low_pass, t = LoggerFilter(kind, 4, 100.0), np.arange(1000) * 0.002
+    for frequency in (2.0, 6.0):
+        omega = 2.0 * math.pi * frequency
+        seen = low_pass.filtered(np.sin(omega * t), 0.002)[250:-1]
+        turned = (low_pass.response(np.array([frequency]))[0] * np.exp(1j * omega * t[250:-1])).imag
+        assert np.max(np.abs(seen - turned)) < 1e-2 * (0.002 * omega) ** 2 / 12.0
+
+
+@pytest.mark.parametrize("ticks", [0.5, 3.0, 7.3, -0.4])
+def test_a_signal_that_comes_later_keeps_its_amplitude_and_is_constant_at_its_ends(ticks: float) -> None:
+    t = np.arange(400) * 0.002
+    wave = np.sin(2.0 * math.pi * 4.0 * t)
+    expected = np.sin(2.0 * math.pi * 4.0 * (t - 0.002 * ticks))
+    seen = later(wave, ticks)
+    assert np.max(np.abs(seen - expected)[20:-20]) < 3e-7  # a straight line is off by up to 3e-4
+    assert later(wave + 2.0, 30.5)[:28] == pytest.approx(2.0)
+
+
+def test_a_channel_responds_as_its_filter_and_its_delay() -> None:
+    response = FORCE.response(np.array([3.0]))[0]
+    assert response == pytest.approx(LOW_PASS.response(np.array([3.0]))[0] * np.exp(-0.024j * math.pi))
+    assert ImportedChannel().response(np.array([3.0])) == pytest.approx([1.0])
 
 
 def test_a_prediction_passes_through_the_stated_filter_and_delay() -> None:

@@ -51,6 +51,13 @@ def averaged(x: Array) -> Array:
     return np.asarray(x[: x.size // GROUP * GROUP].reshape(-1, GROUP).sum(axis=1) / np.sqrt(GROUP))
 
 
+@pytest.mark.parametrize("place", [0, 1, 3998, 3999])
+def test_a_sample_far_off_at_an_end_of_a_recording_is_a_spike(place: int) -> None:
+    noise = np.random.default_rng(6).standard_normal(4000)
+    noise[place] += 40.0
+    assert np.flatnonzero(spikes(noise)).tolist() == [place]
+
+
 def without_spikes(x: Array) -> Array:
     """Noise with straight lines in place of its spikes."""
     there = ~spikes(x)

@@ -27,7 +27,8 @@ from diagnosis.recorded import logged_building
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.loop import RecordedLoop
-from diagnosis.recorded.parts import CALIBRATED, Building
+from diagnosis.recorded.nuisances import CALIBRATED
+from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Delay, Late, Record
 from diagnosis.report.records import HowFar
 from diagnosis.signals import alike

@@ -78,6 +78,16 @@ def test_units_give_the_scales_and_the_loggers_properties_are_kept(bring: Any) -
     assert not stated.interpolated
 
 
+def test_rows_between_the_ticks_lose_nothing_of_a_motion(bring: Any) -> None:
+    rows = np.arange(TIMES.size) / 57.0
+    wave = 10.0 * np.sin(2.0 * np.pi * 2.0 * rows)
+    code, run = bring(table("t,u,y", rows, wave, wave), DRIVE)
+    assert code == 0
+    found = run.columns["master"]["column_displacement"]
+    expected = 1e-2 * np.sin(2.0 * np.pi * 2.0 * 0.01 * np.arange(found.size))
+    assert np.max(np.abs(found - expected)[8:-8]) < 2e-6  # straight lines are off by up to 60 µm
+
+
 def test_rows_between_the_ticks_are_marked(bring: Any, capsys: Any) -> None:
     code, run = bring(table("t,u,y", 1.05 * TIMES, COMMAND, LATE), DRIVE)
     assert code == 0

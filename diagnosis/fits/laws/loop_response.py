@@ -38,12 +38,12 @@ class LoopResponse(Measured):
         self.signals = tuple(part.signals[place] for place in places)
         self._names, self._interval = [names[place] for place in places], interval
         ticks = len(part.measured)
-        frequencies = np.fft.rfftfreq(ticks, interval)
+        frequencies: Array = np.asarray(np.fft.rfftfreq(ticks, interval), dtype=np.float64)
         self._lines = (frequencies > LOWEST) & (frequencies < min(HIGHEST, AT_TICKS / interval))
         self._s = np.asarray(2j * np.pi * frequencies[self._lines], dtype=np.complex128)
         command = self.spectrum(part.inputs[next(iter(part.inputs))])
-        passed = frequencies[self._lines]
-        self._commands = [command * part.channels[place].response(passed) for place in places]
+        passed = [part.channels[place].response(frequencies[self._lines]) for place in places]
+        self._commands = [np.asarray(command * one) for one in passed]
         self.measured = np.stack([apart(self.spectrum(part.measured[:, place])) for place in places], axis=1)
         self.present: Mask = np.ones(self.measured.shape, dtype=bool)
 
@@ -67,7 +67,8 @@ class LoopResponse(Measured):
         """A reading over what its sensor sees."""
         if effects is None:
             return 1.0
-        return np.asarray(effects.gain * np.exp(-effects.delay * self._s) / (1.0 + effects.lag * self._s))
+        late = effects.delay + effects.logger_delay
+        return np.asarray(effects.gain * np.exp(-late * self._s) / (1.0 + effects.lag * self._s))
 
     def first(self, ticks: int) -> LoopResponse:
         """The whole of it, because a spectrum has no beginning."""
