@@ -59,6 +59,7 @@ class LoggedBuilding(Building):
 
     Where what was recorded lies `behind` stated filters and delays, motion, ground and every force also pass those of
     the others: the balance of a linear building holds behind a filter as it does before it, and no filter is undone.
+    A delay beyond those stated is then one of the forces that the logger filtered: others are the master's own numbers.
     """
 
     exact = False
@@ -135,8 +136,10 @@ class LoggedBuilding(Building):
         """Position and force of the master's laboratory and the forces of the others, as the master used them."""
         position, force, used = self._inputs
         delay, gain = self.logger(system)
-        ticks = delay / self._interval
-        return position, earlier(force, ticks) / gain, earlier(used, ticks) / gain
+        rows = np.column_stack([force, used])
+        late = [not self.behind or one.filter is not None for one in self.channels[-rows.shape[1] :]]
+        rows[:, late] = earlier(rows[:, late], delay / self._interval)
+        return position, rows[:, 0] / gain, rows[:, 1:] / gain
 
     def logger(self, system: System) -> tuple[float, float]:
         """Delay (s) and gain of the logger in a hypothesis."""
