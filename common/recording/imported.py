@@ -103,6 +103,12 @@ class ImportedChannel:
     known: bool = False  # whether it was given as a constant rather than measured
 
     @property
+    def passes(self) -> float:
+        """Frequency up to which the channel passes a signal and its noise, Hz: its cutoff, or half its own rate."""
+        own = 0.5 * self.rate if self.interpolated and self.rate > 0.0 else math.inf
+        return min(own, self.filter.cutoff if self.filter else math.inf)
+
+    @property
     def late(self) -> float:
         """By how much the channel comes late, s: its delay and what its filter delays slow motion by."""
         if self.filter is None:

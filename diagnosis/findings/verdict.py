@@ -312,7 +312,7 @@ def heard(search: Search) -> Array:
 def sharpest(search: Search) -> Array:
     """Rms noise (signals,) of a part's sensors at the highest frequencies, without the lines that they pick up."""
     data, fit = search.data, search.chosen
-    return residuals.noise(data.residual(hypothesis.lay(data, fit.z, fit.values)))
+    return data.white_part(data.residual(hypothesis.lay(data, fit.z, fit.values)))
 
 
 def pickup(search: Search) -> Array:

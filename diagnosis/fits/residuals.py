@@ -41,6 +41,7 @@ SPARSE = 0.5  # of an averaged sample's ticks that must be there
 # the median alone says 13 % too little (simulated).
 OUTERMOST = 6.0
 KEPT = 32  # systems with moved parameters: fits over the parameters of effects keep to one, their slopes to one each
+ROUNDED = 1e-9  # of a number of samples that is whole but for the rounding of a computer
 FAR = 1e6  # residual, in σ, of a hypothesis that diverges: worse than any that does not
 
 
@@ -119,6 +120,21 @@ class Data:
             result -= self.lines[: len(result)]
         if self.missing is not None:
             result[self.missing] = 0.0
+        return result
+
+    def white_part(self, residual: Array) -> Array:
+        """Rms (signals,) of the white part of residuals (ticks, signals), of the frequencies that a logger passed.
+
+        Its filter cuts off the noise that came through it, and what it left above tells nothing of that. So as many
+        samples are averaged first as last half a wave of the highest frequency that it passed.
+        """
+        half = 0.5 / (self.part.passes * self.system.plan.test.interval)
+        together = np.maximum(1, np.ceil(half - ROUNDED)).astype(int)
+        result = np.empty(residual.shape[1])
+        for size in np.unique(together):
+            some = residual[: len(residual) // size * size, together == size]
+            sums = some.reshape(-1, size, some.shape[1]).sum(axis=1) / math.sqrt(size)
+            result[together == size] = noise(sums)
         return result
 
     @cached_property
@@ -236,7 +252,7 @@ def prepare(part: Part, record: Record, steps: Mapping[str, float] | None = None
     rounded = np.array([(steps or {}).get(name, 0.0) for name in part.signals])
     planned = np.array([record.planned_noise.get(name, 0.0) for name in part.signals])
     data = Data(part, system, ones, 0.0 * ones, group, train, rounded, record.catalogue, planned=planned)
-    return measured_by(data, 0.0 * ones if part.exact else noise(data.residual(system)))
+    return measured_by(data, 0.0 * ones if part.exact else data.white_part(data.residual(system)))
 
 
 def withheld(ticks: int, interval: float, times: int = 1) -> tuple[int, Mask]:

@@ -65,7 +65,7 @@ def remodelled(fit: Fit) -> Data:
     data, system = fit.data, hypothesis.lay(fit.data, fit.z, fit.values)
     if data.part.exact:
         return data
-    return modelled(residuals.measured_by(data, residuals.noise(data.residual(system))), system)
+    return modelled(residuals.measured_by(data, data.white_part(data.residual(system))), system)
 
 
 def modelled(data: Data, system: System) -> Data:
@@ -175,7 +175,7 @@ def whitened(fit: Fit) -> Data:
     """The data of a fit with white noise of the level of the highest frequencies, lines and spikes taken away."""
     data = replace(fit.data, noise=())
     return residuals.measured_by(
-        data, residuals.noise(data.residual(hypothesis.lay(data, fit.z, fit.values)))
+        data, data.white_part(data.residual(hypothesis.lay(data, fit.z, fit.values)))
     )
 
 
@@ -209,7 +209,7 @@ def shares(data: Data) -> Array:
 
 def loudest(fit: Fit) -> Array:
     """Largest rms density (signals,) of each sensor's noise over that at the highest frequencies; one if white."""
-    white = residuals.noise(fit.data.residual(hypothesis.lay(fit.data, fit.z, fit.values)))
+    white = fit.data.white_part(fit.data.residual(hypothesis.lay(fit.data, fit.z, fit.values)))
     if not fit.data.noise:
         return np.ones(white.size)
     return np.array([loudness(item, float(level)) for item, level in zip(fit.data.noise, white, strict=True)])

@@ -43,6 +43,11 @@ class JoinedPart:
         self.present = np.concatenate([piece.present for piece in self.pieces])
 
     @property
+    def passes(self) -> Array:
+        """Frequencies (signals,) up to which one logger passed noise in all recordings, Hz."""
+        return self.pieces[0].passes
+
+    @property
     def level(self) -> Array:
         """Rms of the readings (signals,) as the pieces have it."""
         sums = sum(len(piece.measured) * np.square(piece.level) for piece in self.pieces)

@@ -112,6 +112,12 @@ class LoggedBuilding(Building):
         return forces[:, storey], demanded, np.stack([*slopes, CALIBRATED * demanded], axis=2)
 
     @property
+    def passes(self) -> Array:
+        """Frequencies (storeys,) up to which the noise of forces passed, Hz: all filters where these are alike."""
+        several = self.channels if self.behind else (self._stated,)
+        return np.full(len(self.signals), min(one.passes for one in several))
+
+    @property
     def shortest(self) -> float:
         """The shortest natural period of the planned building, s."""
         return float(np.min(shear_building.modes(*partition.matrices(self._plan)).periods))

@@ -68,6 +68,10 @@ class Part(Protocol):
     def level(self) -> Array:
         """Rms of the readings (signals,) that a solution of the model may err by a share of."""
 
+    @property
+    def passes(self) -> Array:
+        """Frequencies (signals,) up to which a logger passed the noise of each reading, Hz; inf where it passed all."""
+
     def predict(self, system: System) -> Array:
         """Outputs of the part without noise, (ticks, signals)."""
 
@@ -116,6 +120,11 @@ class Measured:
     def level(self) -> Array:
         """Rms of the readings (signals,)."""
         return np.asarray(np.sqrt(np.mean(np.square(self.measured), axis=0)))
+
+    @property
+    def passes(self) -> Array:
+        """No limit (signals,), Hz."""
+        return np.full(self.measured.shape[1], np.inf)
 
 
 class LaboratoryPart:
@@ -188,15 +197,19 @@ class LaboratoryPart:
         passed = [channel.filter is not None for channel in self.channels]
         if any(passed):
             found += np.where(passed, self.lab.kind.between_ticks(system, drive[1]), 0.0)
-        for place, (name, channel) in enumerate(
-            zip(self.lab.kind.channels.names, self.channels, strict=True)
-        ):
-            more = made.logger_delay if (made := system.effects.sensors.get(name)) else 0.0
+        for place, channel in enumerate(self.channels):
+            made = system.effects.sensors.get(self.lab.kind.channels.names[place])
+            more = made.logger_delay if made else 0.0
             if channel.filter is not None or channel.delay + more != 0.0:
                 found[:, place] = channel.through(found[:, place], self._interval, more)
         if self.freed >= 0:
             found[:, self.freed] += self.begun_elsewhere(self.measured[:, self.freed] - found[:, self.freed])
         return found
+
+    @property
+    def passes(self) -> Array:
+        """Frequencies (signals,) up to which the channels are stated to pass noise, Hz."""
+        return np.array([channel.passes for channel in self.channels])
 
     @property
     def level(self) -> Array:
