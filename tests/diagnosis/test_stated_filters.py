@@ -1,0 +1,97 @@
+"""Laboratories behind filters of a logger that an import map states, and from which real ones deviate."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from common.recording.imported import IMPORT, LoggerFilter
+from common.roles import MASTER
+from diagnosis.diagnose import diagnose
+from diagnosis.fits import residuals
+from diagnosis.fits.fitting import fit
+from diagnosis.recorded.record import NOT_LATE, Record
+from diagnosis.report.records import Report
+from models.registry import Array
+from tests.diagnosis.cases import Cases, lab_a, lab_b, white
+
+RATE = 500.0  # Hz, of the ticks
+BUTTERWORTH = LoggerFilter("butterworth", 4, 100.0)
+BESSEL = LoggerFilter("bessel", 4, 90.0)
+LOW = LoggerFilter("butterworth", 4, 60.0)
+DIGITAL = {
+    "butterworth": signal.butter(4, 100.0, fs=RATE, output="sos"),
+    "bessel": signal.bessel(4, 90.0, fs=RATE, output="sos", norm="mag"),
+}
+
+
+def digital(values: Array, kind: str) -> Array:
+    """Values behind a digital filter that had seen the first one ever before."""
+    return np.asarray(signal.sosfilt(DIGITAL[kind], values - values[0]) + values[0])
+
+
+PASSED: dict[str, tuple[LoggerFilter, Callable[[Array], Array]]] = {
+    "digital Butterworth": (BUTTERWORTH, lambda x: digital(x, "butterworth")),
+    "digital Bessel": (BESSEL, lambda x: digital(x, "bessel")),
+    "3 % off": (BUTTERWORTH, lambda x: replace(BUTTERWORTH, cutoff=103.0).filtered(x, 1.0 / RATE)),
+}
+
+
+def behind(whole: Record, stated: LoggerFilter, passed: Callable[[Array], Array]) -> Record:
+    """An import of readings that passed a filter which is stated as another one."""
+    signals, channels = dict(whole.signals), dict[str, dict[str, object]]()
+    for lab in whole.labs:
+        for name in lab.measured:
+            signals[name] = passed(signals[name])
+            channels.setdefault(lab.role if lab.role == MASTER else "slave", {})[name] = {
+                "filter": asdict(stated)
+            }
+    metadata = {IMPORT: {"data": "a.csv", "channels": json.dumps(channels)}}
+    return replace(whole, signals=signals, run=replace(whole.run, metadata=whole.run.metadata | metadata))
+
+
+def report(whole: Record) -> Report:
+    """The diagnosis of a record."""
+    return diagnose({"slave": whole}, {})["slave"].report
+
+
+@pytest.mark.parametrize("name", PASSED)
+def test_a_laboratory_behind_a_filter_that_is_not_quite_the_stated_one_has_no_fault(
+    name: str, cases: Cases
+) -> None:
+    found = report(behind(cases.record(seed=2), *PASSED[name]))
+    assert (found.status, found.where) == ("within_tolerances", ())
+
+
+def test_a_fault_is_found_behind_a_digital_filter(cases: Cases) -> None:
+    rubbing = cases.record({"column.friction": {"force": 900.0}})
+    found = report(behind(rubbing, *PASSED["digital Butterworth"]))
+    assert found.which[0].effects == ("column.friction",)
+
+
+def test_a_stated_filter_may_delay_by_less_and_by_more(cases: Cases) -> None:
+    whole = behind(cases.record(), *PASSED["digital Butterworth"])
+    part = lab_a(whole).logged(NOT_LATE)
+    found = fit(residuals.prepare(part, whole), {})
+    delays = [
+        one.tolerance * z for one, z in zip(part.nuisances, found.z, strict=True) if one.name == "delay"
+    ]
+    # the digital filter delays slow motion by 0.56 ms less, of which the actuator's own delay and lag take a part
+    assert all(-5.6e-4 < one < -1e-4 for one in delays)
+    assert len(delays) == 2
+
+
+def test_noise_is_measured_by_the_frequencies_that_passed(cases: Cases) -> None:
+    whole = cases.record()
+    level = whole.planned_noise["damper_force"]
+    passed = behind(whole, LOW, lambda x: LOW.filtered(x + 4.0 * level * white(5, whole.ticks), 1.0 / RATE))
+    data = residuals.prepare(lab_b(passed), passed)
+    place = data.part.signals.index("damper_force")
+    assert data.part.passes[place] == 60.0
+    by_ticks = residuals.noise(data.residual(data.system))[place]
+    assert data.white[place] > 0.3 * 4.0 * level > 10.0 * by_ticks
