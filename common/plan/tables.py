@@ -255,7 +255,9 @@ class Tolerances:
     """How well each nominal parameter is known, relative."""
 
     default: float = key("for every parameter not named", default=0.02, least=0.0, most=1.0)
-    parameters: dict[str, float] = key('for single ones, as "part.parameter"', default={}, more=True)
+    parameters: dict[str, float] = key(
+        'for single ones, as "table.delay" or "structure.mass"; a diagnosis lists them', default={}, more=True
+    )
 
 
 @dataclass(frozen=True)
