@@ -180,11 +180,12 @@ class Kind(ABC):
         table, _, key = name.partition(".")
         return system.scaled(table, key, factor)
 
-    def between_ticks(self, system: System, effort: Array) -> Array | float:
+    def between_ticks(self, system: System, drive: Array) -> Array | float:
         """Means of the readings around each tick, less those of straight lines between ticks, (ticks, channels).
 
-        Zero where readings are straight enough. `effort` (ticks,) is the command of a motor (N), held between ticks. A
-        logger's filter, which averages over several ticks, shows these means.
+        Zero where readings are straight enough. `drive` (ticks, 2) holds the transfer system's command (m), in straight
+        lines between ticks, and a motor's (N), held between them. A logger's filter, which averages over several ticks,
+        shows these means.
         """
         return 0.0
 

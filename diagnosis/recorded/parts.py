@@ -196,7 +196,7 @@ class LaboratoryPart:
         found = replay.read(self.lab.kind, system, self.motion(system.unread, drive))
         passed = [channel.filter is not None for channel in self.channels]
         if any(passed):
-            found += np.where(passed, self.lab.kind.between_ticks(system, drive[1]), 0.0)
+            found += np.where(passed, self.lab.kind.between_ticks(system, np.stack(drive, axis=1)), 0.0)
         for place, channel in enumerate(self.channels):
             made = system.effects.sensors.get(self.lab.kind.channels.names[place])
             more = made.logger_delay if made else 0.0

@@ -24,7 +24,7 @@ from laboratories.kind import (
     Pictured,
     Sensed,
 )
-from laboratories.table import linear, model, motor
+from laboratories.table import between, linear, model
 from laboratories.table.descent import TableRamp
 from laboratories.table.record import TableLab
 from models.compiled import bound
@@ -83,11 +83,14 @@ class TableKind(Kind):
         lab.state[linear.STROKE], lab.state[linear.STROKE_RATE] = motion, rate
         truth[self.channels.names.index(self.free)] = motion
 
-    def between_ticks(self, system: System, effort: Array) -> Array:
-        """Of the damper's force, which the motor's force bends after each step of its command, (ticks, channels)."""
-        result = np.zeros((effort.size, len(self.channels.names)))
-        force = self.channels.names.index(self.channels.force)
-        result[:, force] = -motor.bend(system, effort)
+    def between_ticks(self, system: System, drive: Array) -> Array:
+        """Of the damper's force, which the motor bends after each step of its command, and of the acceleration."""
+        result = np.zeros((len(drive), len(self.channels.names)))
+        force, felt = (
+            self.channels.names.index(name) for name in (self.channels.force, "table_acceleration")
+        )
+        result[:, force] = -between.motor_bend(system, drive[:, 1])
+        result[:, felt] = between.acceleration_bend(system, drive[:, 0])
         return result
 
     def drifts(self, plan: Plan) -> bool:

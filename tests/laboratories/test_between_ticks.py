@@ -1,0 +1,73 @@
+"""What a logger's filter sees of table and damper between ticks, against steps a hundred times shorter."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from common.plan.plan import Plan
+from common.recording.imported import LoggerFilter
+from laboratories.table import between
+from models.system import System
+
+TICKS, FINER = 1500, 100
+
+
+@pytest.mark.parametrize(("lag", "share_left"), [(0.0, 0.03), (1e-3, 0.05), (3e-3, 0.12)])
+def test_a_filter_sees_the_force_of_a_motor_whose_command_is_held(lag: float, share_left: float) -> None:
+    plan = Plan()
+    system = System(
+        dataclasses.replace(plan, damper=dataclasses.replace(plan.damper, motor_time_constant=lag))
+    )
+    interval = plan.test.interval
+    t = interval * np.arange(TICKS)
+    command = 20.0 * np.sin(2.0 * np.pi * 2.0 * t) + 5.0 * np.sin(2.0 * np.pi * 7.0 * t)
+    step = 1.0 if lag == 0.0 else -math.expm1(-interval / FINER / lag)
+    force, now = np.zeros(TICKS * FINER), 0.0
+    for place in range(1, force.size):
+        now += step * (command[(place - 1) // FINER] - now)
+        force[place] = now
+    low_pass = LoggerFilter("bessel", 4, 90.0)
+    seen = low_pass.filtered(force, interval / FINER)[::FINER]
+    at_ticks = low_pass.filtered(force[::FINER], interval)
+    bent = low_pass.filtered(force[::FINER] + between.motor_bend(system, command), interval)
+    missed, left = (float(np.std((seen - one)[50:-5])) for one in (at_ticks, bent))
+    assert left < share_left * missed
+
+
+def test_a_motor_at_the_end_of_its_force_does_not_change_between_ticks() -> None:
+    plan = Plan()
+    limited = System(plan)
+    limited = dataclasses.replace(
+        limited,
+        effects=dataclasses.replace(
+            limited.effects, damper=dataclasses.replace(limited.effects.damper, force_limit=5.0)
+        ),
+    )
+    assert np.all(np.abs(between.motor_bend(limited, np.full(200, 30.0))[100:]) < 1e-9)
+    assert np.max(np.abs(between.motor_bend(System(plan), 10.0 * np.sin(np.arange(200))))) > 0.1
+
+
+@pytest.mark.parametrize("delay", [0.0, 1e-3, 5.3e-3])
+def test_a_filter_sees_the_acceleration_of_a_table_whose_command_is_ramped(delay: float) -> None:
+    plan = Plan()
+    table = dataclasses.replace(plan.table, frequency=16.0, damping_ratio=0.6, delay=delay)
+    system = System(dataclasses.replace(plan, table=table))
+    interval = plan.test.interval
+    t = interval * np.arange(TICKS)
+    command = 0.01 * np.sin(2.0 * np.pi * 2.0 * t) + 5e-4 * np.sin(2.0 * np.pi * 7.0 * t)
+    finely = interval / FINER * np.arange(TICKS * FINER)
+    reached = np.interp(finely - delay - interval, t, command)
+    omega = 2.0 * np.pi * table.frequency
+    loop = signal.lti([omega**2, 0.0, 0.0], [1.0, 2.0 * table.damping_ratio * omega, omega**2])
+    acceleration = signal.lsim(loop, reached, finely)[1]
+    low_pass = LoggerFilter("bessel", 4, 90.0)
+    seen = low_pass.filtered(acceleration, interval / FINER)[::FINER]
+    at_ticks = low_pass.filtered(acceleration[::FINER], interval)
+    bent = low_pass.filtered(acceleration[::FINER] + between.acceleration_bend(system, command), interval)
+    missed, left = (float(np.std((seen - one)[100:-5])) for one in (at_ticks, bent))
+    assert left < 0.1 * missed
