@@ -11,6 +11,7 @@ import pytest
 from common.recording.imported import ImportedChannel
 from diagnosis.findings import where
 from diagnosis.findings.sensors.own_reading import gives_energy
+from diagnosis.findings.sites import functions, likely
 from diagnosis.findings.sites.likely import likely_sites, ranked
 from diagnosis.findings.verdict import judge, misplaced
 from diagnosis.findings.which import other_causes
@@ -241,3 +242,15 @@ def test_several_effects_with_which_a_column_gives_energy_are_said_together(case
     effects = {"column.stiffness": {"factor": 0.9}, "column.slip": {"gap": 1e-4, "law": 2.0}}
     fit = fitting.at(data, effects, np.zeros(len(data.part.nuisances)))
     assert gives_energy(fit) == "column.stiffness and column.slip"
+
+
+def test_a_sensor_that_is_likelier_than_its_machine_does_not_come_before_another_one(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part, data, truth = predicted(cases, lab_a)
+    fit = judged(part, data, truth)
+    sites = ("actuator", "column", "sensor.column_force")
+    near = [likely.LikelySite(site, 2.0 * place, 0.5) for place, site in enumerate(sites)]
+    monkeypatch.setattr(likely, "ranked", lambda _: near)
+    monkeypatch.setattr(functions, "lead", lambda *given: 8.0 if given[3] == "column" else 0.0)
+    assert likely_sites(fit) == ("actuator", "sensor.column_force", "column")

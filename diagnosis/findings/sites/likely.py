@@ -60,8 +60,8 @@ class Spectra(NamedTuple):
 def likely_sites(fit: Fit) -> tuple[str, ...]:
     """The sites that the residuals of a fit cannot tell apart; none where no signature is known.
 
-    The machines come first, unless the residuals are likelier functions of what a sensor reads than forces at one. At a
-    machine of which an effect is named that is not asked: what is left is its law's.
+    The machines come first, but a sensor before one where the residuals are likelier functions of what it reads than
+    forces there. At a machine of which an effect is named that is not asked: what is left is its law's.
     """
     near = [item.site for item in ranked(fit) if item.cost < APART]
     order = sorted(near, key=lambda site: "sensor." in site)
@@ -78,8 +78,10 @@ def likely_sites(fit: Fit) -> tuple[str, ...]:
     beaten = {
         machine if nats > 0.0 else sensor for (sensor, machine), nats in leads.items() if abs(nats) > APART
     }
-    first = {sensor for (sensor, _), nats in leads.items() if nats > SCATTER}
-    order.sort(key=lambda site: site not in first)
+    for (sensor, machine), nats in leads.items():
+        if nats > SCATTER and order.index(sensor) > order.index(machine):
+            order.remove(sensor)
+            order.insert(order.index(machine), sensor)
     return tuple(site for site in order if site not in beaten)
 
 
