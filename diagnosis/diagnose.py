@@ -143,7 +143,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
     verdicts, noisy = machines_first(record, verdicts, noisy)
     loud = noise(verdicts, heard)
     sensors = [*noisy, *staircases.findings(hidden, record, logged=late is not None)]
-    aside = {*held, *(record.catalogue[item.effect].signal for item in sensors)}
+    aside = {*held, *(record.catalogue[item.effect].signal for item in sensors), *logger.blurred(verdicts)}
     verdicts = [by_itself(verdict, aside) for verdict in verdicts]
     result = Diagnosis(
         record,

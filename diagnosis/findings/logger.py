@@ -22,6 +22,7 @@ from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, NOT_LATE, Delay, Late, Record
 from diagnosis.signals import clock
 
+BLURRED = 0.1  # of a reading's noise, from which on what an interpolation misses may be told from it
 TOLD = 4e-3  # of a reading's gain: the report shows two digits, and less is no matter for a test
 
 
@@ -29,6 +30,26 @@ def interpolated(parts: Sequence[Part]) -> dict[str, float]:
     """The step whose rounding would be as large as the error of an interpolated ground motion, by signal."""
     grounds = [part for part in parts if isinstance(part, Ground)]
     return {part.signals[0]: math.sqrt(12.0) * part.blur for part in grounds if part.blur > 0.0}
+
+
+def blurred(verdicts: Sequence[PartVerdict]) -> set[str]:
+    """The readings of which straight lines between a logger's rows may miss as much as follows the motion.
+
+    Between rows every Δ such lines miss (ω·Δ)²/12 of a wave on average, most where it bends most. Whether a recording
+    that was interpolated elsewhere has straight lines is not stated.
+    """
+    result = set[str]()
+    for data, fit in ((one.search.data, one.search.chosen) for one in verdicts):
+        part, interval = data.part, data.system.plan.test.interval
+        if not isinstance(part, LaboratoryPart):
+            continue
+        bends = np.diff(part.predict(hypothesis.lay(data, fit.z, fit.values)), 2, axis=0) / interval**2
+        for place, channel in enumerate(part.channels):
+            if channel.interpolated and channel.rate > 0.0:
+                missed = float(np.std(bends[:, place])) / (12.0 * channel.rate**2)
+                if missed > BLURRED * data.white[place]:
+                    result.add(part.signals[place])
+    return result
 
 
 def later(late: Late, verdict: PartVerdict, record: Record) -> Late:

@@ -13,12 +13,13 @@ from scipy import signal
 from common.recording.imported import IMPORT, LoggerFilter
 from common.roles import MASTER
 from diagnosis.diagnose import diagnose
+from diagnosis.findings import logger
 from diagnosis.fits import residuals
 from diagnosis.fits.fitting import fit
 from diagnosis.recorded.record import NOT_LATE, Record
 from diagnosis.report.records import Report
 from models.registry import Array
-from tests.diagnosis.cases import Cases, lab_a, lab_b, white
+from tests.diagnosis.cases import Cases, lab_a, lab_b, unknown, white
 
 RATE = 500.0  # Hz, of the ticks
 BUTTERWORTH = LoggerFilter("butterworth", 4, 100.0)
@@ -44,13 +45,16 @@ PASSED: dict[str, tuple[LoggerFilter, Callable[[Array], Array]]] = {
 
 def behind(whole: Record, stated: LoggerFilter, passed: Callable[[Array], Array]) -> Record:
     """An import of readings that passed a filter which is stated as another one."""
+    return logged(whole, {"filter": asdict(stated)}, passed)
+
+
+def logged(whole: Record, stated: dict[str, object], passed: Callable[[Array], Array]) -> Record:
+    """An import of readings that a logger changed, with the same statement on each channel."""
     signals, channels = dict(whole.signals), dict[str, dict[str, object]]()
     for lab in whole.labs:
         for name in lab.measured:
             signals[name] = passed(signals[name])
-            channels.setdefault(lab.role if lab.role == MASTER else "slave", {})[name] = {
-                "filter": asdict(stated)
-            }
+            channels.setdefault(lab.role if lab.role == MASTER else "slave", {})[name] = stated
     metadata = {IMPORT: {"data": "a.csv", "channels": json.dumps(channels)}}
     return replace(whole, signals=signals, run=replace(whole.run, metadata=whole.run.metadata | metadata))
 
@@ -95,3 +99,15 @@ def test_noise_is_measured_by_the_frequencies_that_passed(cases: Cases) -> None:
     assert data.part.passes[place] == 60.0
     by_ticks = residuals.noise(data.residual(data.system))[place]
     assert data.white[place] > 0.3 * 4.0 * level > 10.0 * by_ticks
+
+
+@pytest.mark.parametrize(("rate", "names"), [(300.0, {"damper_stroke"}), (4000.0, set())])
+def test_what_straight_lines_between_rows_may_miss_is_no_noise_that_follows_the_motion(
+    rate: float, names: set[str], cases: Cases
+) -> None:
+    whole = logged(cases.record(), {"interpolated": True, "rate": rate}, lambda x: x)
+    found = fit(residuals.prepare(lab_b(whole), whole), {})
+    assert logger.blurred([unknown(found)]) == names
+    assert (
+        logger.blurred([unknown(fit(residuals.prepare(lab_b(cases.record()), cases.record()), {}))]) == set()
+    )
