@@ -184,7 +184,10 @@ def imported(run: Run) -> ImportedData | None:
 
 
 def later(values: Samples, ticks: float) -> Samples:
-    """A signal (n,) that comes so many ticks later, on cubics through four samples; its ends stay constant."""
+    """A signal (n,) that comes so many ticks later, on cubics through four samples; its ends stay constant.
+
+    It is for what a model predicts, which is smooth; of noise near half the rate of the ticks it takes a part away.
+    """
     whole = math.floor(ticks)
     part = ticks - whole
     weights = [

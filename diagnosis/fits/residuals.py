@@ -41,6 +41,7 @@ SPARSE = 0.5  # of an averaged sample's ticks that must be there
 # the median alone says 13 % too little (simulated).
 OUTERMOST = 6.0
 KEPT = 32  # systems with moved parameters: fits over the parameters of effects keep to one, their slopes to one each
+SUMS = 50  # of samples at least, from which the rms of white noise is known to a few per cent
 ROUNDED = 1e-9  # of a number of samples that is whole but for the rounding of a computer
 FAR = 1e6  # residual, in σ, of a hypothesis that diverges: worse than any that does not
 
@@ -129,7 +130,7 @@ class Data:
         samples are averaged first as last half a wave of the highest frequency that it passed.
         """
         half = 0.5 / (self.part.passes * self.system.plan.test.interval)
-        together = np.maximum(1, np.ceil(half - ROUNDED)).astype(int)
+        together = np.clip(np.ceil(half - ROUNDED), 1, max(1, len(residual) // SUMS)).astype(int)
         result = np.empty(residual.shape[1])
         for size in np.unique(together):
             some = residual[: len(residual) // size * size, together == size]

@@ -109,3 +109,10 @@ def test_what_straight_lines_between_rows_may_miss_is_no_noise_that_follows_the_
     assert (
         logger.blurred([unknown(fit(residuals.prepare(lab_b(cases.record()), cases.record()), {}))]) == set()
     )
+
+
+def test_noise_behind_a_filter_far_below_the_rate_is_measured_on_few_sums(cases: Cases) -> None:
+    whole = logged(cases.record(), {"filter": asdict(replace(LOW, cutoff=0.2))}, lambda x: x)
+    data = residuals.prepare(lab_b(whole), whole)
+    assert np.all(np.isfinite(data.white))
+    assert np.all(data.white > 0.0)
