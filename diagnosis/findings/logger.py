@@ -33,8 +33,9 @@ def interpolated(parts: Sequence[Part]) -> dict[str, float]:
 
 
 def blurred(verdicts: Sequence[PartVerdict]) -> set[str]:
-    """The readings of which straight lines between a logger's rows may miss as much as follows the motion.
+    """The readings of which straight lines between a logger's rows may miss a part that counts beside the noise.
 
+    That part follows the motion, as noise of a loose connector does.
     Between rows every Δ such lines miss (ω·Δ)²/12 of a wave on average, most where it bends most. Whether a recording
     that was interpolated elsewhere has straight lines is not stated.
     """

@@ -287,10 +287,9 @@ def misplaced(search: Search) -> bool:
     """
     sites = {search.data.catalogue[name].site for name in search.chosen.names}
     found = ranked(search.commissioned)
-    near = {item.site for item in found if item.cost < APART}
     by_form = set(likely_sites(search.commissioned))
-    if all("sensor." in site for site in by_form):
-        near = by_form or near
+    sensors_alone = bool(by_form) and all("sensor." in site for site in by_form)
+    near = by_form if sensors_alone else {item.site for item in found if item.cost < APART}
     return bool(found) and not sites & near and found[0].left < 1.0 - search.explained
 
 

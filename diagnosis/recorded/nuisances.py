@@ -99,7 +99,8 @@ class LoggedForce(Nuisance):
 class LoggedReadings(Nuisance):
     """Delay (s), about the one found elsewhere, or gain with which a logger recorded readings of a laboratory.
 
-    A logger whose filter is stated may delay by less than that, one of which nothing is stated by no less than nothing.
+    A logger whose filter is stated may delay by less than that filter; one of which nothing is stated records nothing
+    early.
     """
 
     of_record = True

@@ -41,10 +41,9 @@ GOLDEN, DIVISIONS = 0.5 * (math.sqrt(5.0) - 1.0), 7  # which leave a thirtieth o
 
 
 class ReadSpectra(NamedTuple):
-    """ReadSpectra of readings of one laboratory."""
+    """Spectra of readings of one laboratory."""
 
     frequency: Array  # (lines,) Hz
-    interval: float  # s
     read: Lines  # (lines, readings)
     true: Lines  # (lines, readings) without a filter
     slopes: Lines  # (lines, readings, parameters) of these over parameters that err by about one
@@ -61,7 +60,7 @@ def spectra(
     *,
     noisy: bool = False,
 ) -> ReadSpectra:
-    """ReadSpectra up to `highest` (Hz) of readings as recorded and without a filter (ticks, readings).
+    """Spectra up to `highest` (Hz) of readings as recorded and without a filter (ticks, readings).
 
     `slopes` (ticks, readings, parameters) are those of the latter over parameters that err by about one. Where the
     latter are `noisy`, a band tells of a filter only as far as the two go together.
@@ -77,7 +76,7 @@ def spectra(
     frequency = frequency[kept]
     edges = np.geomspace(frequency[0], frequency[-1], BANDS + 1)[:-1]
     starts = np.unique(np.searchsorted(frequency, edges))
-    return ReadSpectra(frequency, interval, lines(read), lines(true), lines(slopes), starts, noisy)
+    return ReadSpectra(frequency, lines(read), lines(true), lines(slopes), starts, noisy)
 
 
 def surprise(of: ReadSpectra, channel: ImportedChannel) -> float:

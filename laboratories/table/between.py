@@ -16,7 +16,7 @@ def motor_bend(system: System, command: Array) -> Array:
 
     `command` (ticks,) N is held until the next tick. After its step the force u(t) = F + (u₀ − F)·e^(−t/T) changes
     fast and then slowly; over an interval Δ its mean lies 1/(1 − e^(−a)) − 1/a − 1/2 of its change above that of a
-    straight line, with a = Δ/T. A sharp end of the motor's force is taken, whatever its bend.
+    straight line, with a = Δ/T. The limit of the force is taken to be sharp.
     """
     from scipy import signal
 
