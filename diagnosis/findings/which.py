@@ -21,7 +21,7 @@ from diagnosis.report.records import Candidate
 from diagnosis.report.values import Parameters, Value
 from laboratories.effects.effect import Effect
 
-# Of -2 log likelihood, which an alternative must gain to be listed: a parameter a standard error from zero gains as much.
+# Of -2 log likelihood, which an alternative must gain to be listed: a parameter one standard error off gains as much.
 LEAST_GAIN = 1.0
 MOST_OTHERS = 5  # alternatives listed, the most probable ones: as many as a reader compares with the verdict
 
