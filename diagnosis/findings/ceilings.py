@@ -14,7 +14,7 @@ from diagnosis.fits.unexplained import gaps
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.report.evidence import Ceiling, Coordinate, Dependence, Unknown
 from diagnosis.signals import windows
-from diagnosis.signals.ceiling import ceiling, depends_on
+from diagnosis.signals.predictors.ceiling import ceiling, depends_on
 from models.registry import Array
 
 COORDINATE: dict[str, Coordinate] = {

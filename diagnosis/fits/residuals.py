@@ -18,9 +18,9 @@ from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, Part
 from diagnosis.recorded.record import Record
 from diagnosis.signals import colour
-from diagnosis.signals.ceiling import Crosswise
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.noise_model import NoiseModel
+from diagnosis.signals.predictors.ceiling import Crosswise
 from diagnosis.signals.spikes import deviation
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect

@@ -15,7 +15,7 @@ from diagnosis.fits.laws.loop import of_one_loop, single, whole_loops
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
-from diagnosis.fits.unexplained import MATERIAL, foresees, leaves, model_error, remaining
+from diagnosis.fits.unexplained import MATERIAL, foresees, leaves, model_error, remaining, resonant
 
 MOST = 3  # effects of one part, the bias of a sensor aside: more of them can imitate any residual
 # Effects of one part that leave only noise, each of them needed for that; the share of what is left that each must
@@ -51,17 +51,27 @@ class Search:
 
 
 def search(data: Data, scales: Scales) -> Search:
+    """What was found in a part, beside a resonance that its inputs swing where nothing else is left to explain."""
+    found, fine = at_any_size(data, scales)
+    swings = None if fine is None else resonant(fine, model_error(fine))
+    return found if swings is None else at_any_size(replace(data, related=swings), scales)[0]
+
+
+def at_any_size(data: Data, scales: Scales) -> tuple[Search, Fit | None]:
     """What was found in a part, with nothing withheld where what it leaves acts for a short time only.
 
-    Where no gap is larger than what two good solutions of one model may differ by, a smaller one is looked for.
+    Where no gap is larger than what two good solutions of one model may differ by, a smaller one is looked for: in the
+    fit beside it, which is None where there is a gap.
     """
     bare = settling.settled(fitting.fit(data, {}))
     found = within(data, bare, scales)
     if data.part.exact or leaves(found.chosen, model_error(found.chosen)) or tells(found, bare):
-        return found
+        return found, None
     fine = fitting.polished(settling.settled(fitting.fit(data.fine, {}, bare.z)))
     erring = model_error(fine)
-    return within(data.fine, fine, scales) if leaves(fine, erring) or foresees(fine, erring) else found
+    if leaves(fine, erring) or foresees(fine, erring):
+        return within(data.fine, fine, scales), None
+    return found, fine
 
 
 def tells(found: Search, bare: Fit) -> bool:

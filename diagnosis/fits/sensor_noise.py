@@ -21,10 +21,10 @@ from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
 from diagnosis.signals import colour, pickup
-from diagnosis.signals.ceiling import Crosswise
-from diagnosis.signals.features import features
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.noise_model import NoiseModel, Source
+from diagnosis.signals.predictors.ceiling import Crosswise
+from diagnosis.signals.predictors.features import features
 from diagnosis.signals.spikes import spikes
 from models.registry import Array
 from models.system import System
@@ -228,15 +228,20 @@ class Foreseen(NamedTuple):
 
 
 def foreseen(fit: Fit) -> list[Foreseen]:
-    """What the inputs say of the residuals of every signal that no model of the noise can have.
+    """What the inputs say of the residuals of every signal that no model of the noise can have."""
+    data = fit.data
+    if data.related is None or data.related.count != data.groups:
+        return [Foreseen(0.0, 0.0)] * data.sigma.size
+    return told(fit, data.related.predict(fit.reduced))
+
+
+def told(fit: Fit, said: Array) -> list[Foreseen]:
+    """How much of the residuals of every signal a prediction (groups, signals) says.
 
     The prediction ŷ of a stretch of time has not seen it, so with white noise y of unit variance Σyŷ/√Σŷ² is a standard
     normal number.
     """
     data = fit.data
-    if data.related is None or data.related.count != data.groups:
-        return [Foreseen(0.0, 0.0)] * data.sigma.size
-    said = data.related.predict(fit.reduced)
     energy = np.sum(said**2, axis=0)
     along = np.sum(fit.reduced * said, axis=0)
     tails = np.array([item.tails for item in data.noise]) if data.noise else np.ones(data.sigma.size)

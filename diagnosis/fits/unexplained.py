@@ -6,15 +6,18 @@ It is judged by sums over averaged samples, because noise averages out and syste
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.fits import sensor_noise
+from diagnosis.fits import fitting, hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.sensor_noise import Foreseen
 from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.signals.noise_model import NoiseModel
+from diagnosis.signals.predictors.ceiling import Crosswise
+from diagnosis.signals.predictors.resonances import Resonances
 from models.registry import Array
 
 # The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
@@ -98,6 +101,35 @@ def foresees(fit: Fit, allowed: Array) -> bool:
     """
     if isinstance(fit.data.part, LoggedBuilding):
         return False
+    return is_foreseen(sensor_noise.foreseen(fit), allowed)
+
+
+def is_foreseen(found: list[Foreseen], allowed: Array) -> bool:
+    """Whether what inputs say of the residual of any signal is more than is allowed in it (signals,), over σ."""
     least = np.maximum(FORESEEN, allowed)
-    found = zip(sensor_noise.foreseen(fit), least, strict=True)
-    return any(item.ratio > limit and item.significance > SIGNIFICANT for item, limit in found)
+    return any(
+        item.ratio > limit and item.significance > SIGNIFICANT
+        for item, limit in zip(found, least, strict=True)
+    )
+
+
+def resonant(fit: Fit, allowed: Array) -> Crosswise | None:
+    """What may follow from a part's inputs with the resonance that its residual shows; None where it shows none.
+
+    The resonance is looked for in the residual as it is, and taken away from what counts as noise. Then it must be
+    foreseen of a residual that is whitened with this noise, stretch by stretch from frequencies and sizes that are
+    found elsewhere, by more than is `allowed` in its signal (signals,), over σ.
+    """
+    data, part = fit.data, fit.data.part
+    if part.exact or isinstance(part, LoggedBuilding) or data.related is None:
+        return None
+    system = hypothesis.lay(data, fit.z, fit.values)
+    inputs = data.averaged(sensor_noise.inputs(part, system))
+    if data.related.count != len(inputs):
+        return None
+    resonances = Resonances(inputs, data.system.plan.test.interval * data.group)
+    left = sensor_noise.remainder(data, system).noise / data.sigma
+    related = data.related.beside(resonances.columns(left))
+    beside = fitting.at(sensor_noise.modelled(replace(data, related=related), system), fit.values, fit.z)
+    found = sensor_noise.told(beside, resonances.predict(beside.reduced))
+    return related if is_foreseen(found, allowed) else None

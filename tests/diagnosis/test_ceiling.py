@@ -10,9 +10,9 @@ from scipy import signal
 
 from common.errors import InputError
 from diagnosis.fits.residuals import withheld_ticks
-from diagnosis.signals.ceiling import ceiling, depends_on
-from diagnosis.signals.features import plays
 from diagnosis.signals.mask import Mask
+from diagnosis.signals.predictors.ceiling import ceiling, depends_on
+from diagnosis.signals.predictors.features import plays
 from models.registry import Array
 
 H, N = 0.002, 15_000

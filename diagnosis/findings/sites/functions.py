@@ -21,8 +21,8 @@ from diagnosis.fits import hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals import colour
-from diagnosis.signals.ceiling import Crosswise
-from diagnosis.signals.features import aged, bent, lagged, mixed, plays, scaled, slow, standardised
+from diagnosis.signals.predictors.ceiling import Crosswise
+from diagnosis.signals.predictors.features import aged, bent, lagged, mixed, plays, scaled, slow, standardised
 from diagnosis.signals.systematic import correlations
 from models.registry import Array
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping
 from typing import TypeVar
@@ -10,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
-from diagnosis.signals.features import features
 from diagnosis.signals.mask import Mask
+from diagnosis.signals.predictors.features import features
 from diagnosis.signals.systematic import systematic_rms
 from models.indicators.checks import checked
 from models.registry import Array
@@ -93,6 +94,7 @@ class Crosswise:
         gram = [x[self._fold == k].T @ x[self._fold == k] for k in range(FOLDS)]
         whole = np.sum(gram, axis=0)
         self._turned = [np.linalg.eigh(whole - one) for one in gram]
+        self._beside = np.zeros((len(x), 0))
 
     @property
     def count(self) -> int:
@@ -105,6 +107,25 @@ class Crosswise:
         Each column has the penalty that predicts withheld blocks best, and zeros where nothing predicts better than
         zero.
         """
+        said = self._ridge(y)
+        return said + self._plain(y - said) if self._beside.size else said
+
+    def beside(self, columns: Array) -> Crosswise:
+        """The same with a few columns (n, k) more, which predict what these features leave, without a penalty."""
+        more = copy.copy(self)
+        more._beside = np.hstack([self._beside, columns])
+        return more
+
+    def _plain(self, y: Array) -> Array:
+        """Predictions (n, m) of the columns of y (n, m) from the few columns; zeros as in `predict`."""
+        said = np.zeros_like(y)
+        for k in range(FOLDS):
+            here = self._fold == k
+            said[here] = self._beside[here] @ np.linalg.lstsq(self._beside[~here], y[~here], rcond=None)[0]
+        return np.where(np.sum((y - said) ** 2, axis=0) < np.sum(y**2, axis=0), said, 0.0)
+
+    def _ridge(self, y: Array) -> Array:
+        """Predictions (n, m) from the features."""
         product = [self._x[self._fold == k].T @ y[self._fold == k] for k in range(FOLDS)]
         wanted = np.sum(product, axis=0)
         said = np.zeros((PENALTIES.size, *y.shape))

@@ -1,0 +1,107 @@
+"""What swings for many periods at a machine is found, though it looks like noise of a colour."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from diagnosis.findings.verdict import judge
+from diagnosis.fits import fitting, residuals, settling
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import search
+from diagnosis.fits.unexplained import SIGNIFICANT, foresees, leaves, model_error, resonant
+from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.recorded.record import Record
+from diagnosis.signals.predictors.ceiling import Crosswise
+from diagnosis.signals.predictors.resonances import Resonances
+from models.registry import Array
+from tests.diagnosis.cases import Cases, lab_a, lab_b
+
+INTERVAL = 0.008  # s, of averaged samples
+FREQUENCY, DAMPING, MASS = 5.3, 0.012, 40.0  # Hz, ratio and kg of a part that is bolted to the piston
+FORCE, PLACE = 1, 0  # places of the column's force and its displacement among the readings
+
+
+def swung(acceleration: Array, interval: float) -> Array:
+    """Force (n,) N of a part that swings on something that moves by an acceleration (n,) m/s²."""
+    omega = 2.0 * math.pi * FREQUENCY
+    spring = [2.0 * DAMPING * omega, omega**2]
+    pole = signal.cont2discrete((spring, [1.0, *spring]), interval)
+    return np.asarray(MASS * signal.lfilter(np.ravel(pole[0]), pole[1], acceleration))
+
+
+def with_a_fixture(whole: Record) -> LaboratoryPart:
+    """The master's laboratory with a part that swings on the piston, whose force the load cell reads."""
+    part, interval = lab_a(whole), whole.plan.test.interval
+    place = part.predict(whole.systems[part.role])[:, PLACE]
+    measured = part.measured.copy()
+    measured[:, FORCE] += swung(np.gradient(np.gradient(place, interval), interval), interval)
+    return part.replaced(measured=measured)
+
+
+def significance(y: Array, said: Array) -> float:
+    """Standard deviations of a prediction (n, 1) of white noise y (n, 1) above chance."""
+    return float(np.sum(y * said) / max(math.sqrt(float(np.sum(said**2))), 1e-300))
+
+
+def shaken(seed: int) -> tuple[Array, Array]:
+    """An input (n,) with most of its energy near 2 Hz, and white noise (n,) beside it."""
+    rng = np.random.default_rng(seed)
+    b, a = signal.butter(2, [1.0, 3.0], "band", fs=1.0 / INTERVAL)
+    noise = rng.standard_normal((2, 1500))
+    return np.asarray(signal.lfilter(b, a, noise[0]) + 0.05 * noise[0]), noise[1]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_oscillator_is_predicted_for_time_that_was_not_seen(seed: int) -> None:
+    moving, noise = shaken(seed)
+    force = swung(moving, INTERVAL)
+    resonances = Resonances(np.column_stack([noise[::-1], moving]), INTERVAL)
+    y = (6.0 * force / np.linalg.norm(force) * math.sqrt(3.0) + noise)[:, None]
+    assert significance(y, resonances.predict(y)) > SIGNIFICANT
+    columns = resonances.columns(y)
+    power = np.abs(np.fft.rfft(columns[:, 0] * np.hanning(len(columns))))
+    assert np.argmax(power) / (len(columns) * INTERVAL) == pytest.approx(FREQUENCY, abs=0.15)
+
+
+def test_noise_is_not_predicted_however_many_oscillators_are_tried() -> None:
+    for seed in range(12):
+        moving, noise = shaken(seed)
+        said = Resonances(moving[:, None], INTERVAL).predict(noise[:, None])
+        assert significance(noise[:, None], said) < 0.7 * SIGNIFICANT
+
+
+def test_a_few_columns_more_predict_what_features_leave() -> None:
+    rng = np.random.default_rng(4)
+    x, more, noise = (rng.standard_normal((600, k)) for k in (3, 1, 1))
+    y = x[:, :1] + more + 0.1 * noise
+    features = Crosswise(x)
+    assert np.std(y - features.beside(more).predict(y)) < 0.12
+    assert np.std(y - features.predict(y)) > 0.9
+
+
+def test_a_part_that_swings_on_the_piston_is_no_noise_of_the_load_cell(cases: Cases) -> None:
+    whole = cases.record({}, duration=12.0)
+    data = residuals.prepare(with_a_fixture(whole), whole)
+    bare = settling.settled(fitting.fit(data.fine, {}))
+    erring = model_error(bare)
+    assert not leaves(bare, erring)
+    assert not foresees(bare, erring)  # what it leaves is taken for noise of a colour
+    assert judge(search(data, Scales(whole))).outcome == "unknown"
+
+
+def test_a_laboratory_in_which_nothing_swings_has_no_resonance(cases: Cases) -> None:
+    whole = cases.record({}, duration=12.0)
+    for part in (lab_a(whole), lab_b(whole)):
+        fit = settling.settled(fitting.fit(residuals.prepare(part, whole).fine, {}))
+        assert resonant(fit, model_error(fit)) is None
+
+
+def test_a_mass_that_swings_on_the_table_is_named_where_it_looked_like_noise(cases: Cases) -> None:
+    swings = {"table.second_mass": {"frequency": 3.1, "share": 0.05, "damping": 0.02}}
+    whole = cases.record(swings, duration=12.0)
+    verdict = judge(search(residuals.prepare(lab_b(whole), whole), Scales(whole)))
+    assert verdict.effects == ("table.second_mass",)
