@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from common.recording.imported import ImportedChannel
 from diagnosis.findings import where
 from diagnosis.findings.sensors.own_reading import gives_energy
 from diagnosis.findings.sites import functions, likely
-from diagnosis.findings.sites.likely import likely_sites, ranked
+from diagnosis.findings.sites.likely import APART, likely_sites, ranked
 from diagnosis.findings.verdict import judge, misplaced
 from diagnosis.findings.which import other_causes
 from diagnosis.fits import fitting, hypothesis, residuals
@@ -116,6 +117,21 @@ def test_a_wire_that_is_not_along_the_stroke_lies_at_its_sensor(cases: Cases) ->
     stroke = part.signals.index("damper_stroke")
     truth[:, stroke] += bent_by(truth[:, stroke], 4e-4)
     assert likely_sites(judged(part, data, truth)) == ("sensor.damper_stroke",)
+
+
+def through_a_belt(force: Array) -> Array:
+    """A motor's force (n,) of which an eighth comes through a belt that resonates at 36 Hz."""
+    omega = 2.0 * np.pi * 36.0
+    belt = signal.cont2discrete(([omega**2], [1.0, 0.2 * omega, omega**2]), 2e-3)
+    return np.asarray(force + 0.13 * (signal.lfilter(np.ravel(belt[0]), belt[1], force) - force))
+
+
+def test_what_follows_linearly_from_a_motor_s_command_lies_at_the_damper(cases: Cases) -> None:
+    part, data, _ = predicted(cases, lab_b)
+    fit = judged(part, data, commanded(part, 1, through_a_belt).predict(data.system))
+    fine = fitting.fit(fit.data.fine, {})
+    assert {item.site for item in ranked(fine) if item.cost < APART} == {"damper", "sensor.damper_stroke"}
+    assert likely_sites(fine)[0] == "damper"
 
 
 def test_a_force_that_depends_on_the_stroke_lies_at_the_damper(cases: Cases) -> None:

@@ -84,14 +84,17 @@ def of_reading(read: Array) -> Iterator[Array]:
 def of_motion(motion: Array, others: Array, interval: float) -> Iterator[Array]:
     """The same functions (n, …) of a motion (n,), and these with ones of its speed, and of `others` (n, m) as well.
 
-    These are what the laboratory was told and how its other readings change: what a mass or a motor makes of them.
+    These are what the laboratory was told and how its other readings change: what a mass or a motor makes of them. What
+    is linear in all of them and in their past is asked by itself: a belt of the motor is no more.
     """
     value, beside = around(motion[:, None]), around(others)
     simple, speed = of_value(value), scaled(np.gradient(value, axis=0))
+    linear = lagged(np.hstack([value, beside]), interval)
     yield simple
+    yield linear
     own = [bent(speed), mixed(value, speed), aged(value, speed)]
     bend = scaled(np.gradient(speed, axis=0))
-    yield np.hstack([simple, speed, bend, *own, bent(beside), lagged(np.hstack([value, beside]), interval)])
+    yield np.hstack([simple, speed, bend, *own, bent(beside), linear])
 
 
 def of_value(value: Array) -> Array:
