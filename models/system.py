@@ -56,6 +56,10 @@ class ColumnEffects:
     spalling: float = 0.0  # share of their strength that outer layers lose per strain at which bars yield
     shaft: float = 0.6  # share of the flexibility outside the section
     focus: float = 2.0  # strain in tension over that at which bars yield to which concrete unloads
+    core: float = 0.1  # share of the spalling that the core has
+    rubbing: float = 0.0  # friction of cracks over stiffness times yield displacement
+    eccentricity: float = 0.0  # constant force over the same
+    uncracked: float = 1.0  # first stiffness of that section over the planned one
     centring: float = math.inf  # m, deformation where a self-centring specimen bends
     centring_hardening: float = 0.05
     centring_loop: float = 0.5  # height of its flag over its force there

@@ -34,6 +34,10 @@ OF_YIELDING = (
     "spalling",
     "shaft",
     "focus",
+    "core",
+    "rubbing",
+    "eccentricity",
+    "uncracked",
 )
 OF_CENTRING = ("centring", "centring_hardening", "centring_loop")
 
@@ -50,15 +54,17 @@ def as_table(column: Column, effects: ColumnEffects) -> tuple[Column, ColumnEffe
     if centres:
         name = CENTRING
         values = np.array([column.stiffness, left.centring, left.centring_hardening, left.centring_loop])
-    given = parameters(name, values)
+    given, stiffness = parameters(name, values), float(values[0])
+    if stiffness != column.stiffness and (left.stiffening or left.slip_share != 1.0):
+        return column, left  # which are over the stiffness of the table
     try:
-        specimens.pack(name, stiffness=column.stiffness, **given)
+        specimens.pack(name, stiffness=stiffness, **given)
     except InputError:  # a value that the effect may have and the model may not
         return column, left
     null = ColumnEffects()
     fields = OF_CENTRING if centres else OF_YIELDING
     left = replace(left, **{field: getattr(null, field) for field in fields})
-    return replace(column, model=name, parameters=given), left
+    return replace(column, model=name, stiffness=stiffness, parameters=given), left
 
 
 def parameters(name: str, values: Array) -> dict[str, float]:

@@ -165,7 +165,9 @@ def yielding(stiffness: float, effects: ColumnEffects) -> Array:
         hardening, shape = max(hardening, 0.0), [effects.unloading, 0.0, 0.0]
     elif name == "layered":
         concrete = [effects.concrete, effects.axial, effects.concrete_strength, effects.spalling]
-        shape = [*concrete, effects.exponent, effects.shaft, effects.focus]
+        stiffness *= effects.uncracked
+        beside = [effects.core, effects.rubbing, effects.eccentricity]
+        shape = [*concrete, effects.exponent, effects.shaft, effects.focus, *beside]
     elif name != "bilinear":
         # a skeleton of three lines does not stiffen
         shape = [effects.first_bend, max(effects.second_stiffness, hardening)]

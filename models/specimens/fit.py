@@ -142,6 +142,9 @@ FREE: dict[str, dict[str, SearchRange]] = {
         "sharpness": SearchRange(3.0, 20.0, (16.0,)),
         "shaft": SearchRange(0.2, 0.9, (0.4, 0.75), log=False),
         "focus": SearchRange(0.3, 30.0, (2.0,)),
+        "core": SearchRange(0.0, 1.0, (0.5,), log=False),
+        "friction": SearchRange(0.0, 0.08, (0.02,), log=False),
+        "eccentricity": SearchRange(-0.3, 0.3, (0.0,), log=False),
     },
     "self_centring": {
         "stiffness": STIFFNESS,

@@ -2,23 +2,25 @@
 
     strain      ε = ε₀ + φ·y of a layer at y, over the strain at which bars yield; the section is 1 deep
     balance     N = Σ σ, the axial force, gives ε₀;  M = Σ σ·y
-    deformation δ = a·φ + h·f/k₁,   f = g·M + α·k·δ,   k₁ = (1 − α)·k
+    deformation δ = a·φ + h·f₁/k₁,   f₁ = g·M,   k₁ = (1 − α)·k
+    force       f = (1 − r/c)·f₁ + α·k·δ + r/c·k·z + e·k·δ_y,   z = z + Δδ clipped to ±c·δ_y,   c = 0.1
 
 Bars: three layers at ±0.38 and 0, a quarter of them in the middle, each with the law of Menegotto and Pinto
 (`menegotto_pinto`, hardening 0.01). Concrete: ten layers of the stiffness ρ times that of all bars together, without
-tension. It is compressed along a parabola to the strength σ_c at twice the strain σ_c, and keeps that strength in the
-core; the outer layer on either side spals: it loses the share s of its strength per strain, down to a fifth, and the
-core a tenth of that share. A layer unloads and reloads along a line from the farthest point of its parabola to the
-common point (ε_f, ε_f) of all such lines in tension, and is open beyond where that line has no stress. a and g are
-such that the column begins with the stiffness k, of whose flexibility the shaft has the share h, and that the outer
-bars of a linear column would yield at δ_y. All stresses are over the bars' yield stress, those of the concrete over ρ
-times it.
+tension. It is compressed along a parabola to the strength σ_c at twice the strain σ_c. Beyond, the outer layer on
+either side spals: it loses the share s of its strength per strain, down to a fifth. The core loses the share κ·s, which
+is little within many hoops and nearly s within few. A layer unloads and reloads along a line from the farthest point of
+its parabola to the common point (ε_f, ε_f) of all such lines in tension, and is open beyond where that line has no
+stress. a and g are such that the column begins with the stiffness k, of whose flexibility the shaft has the share h,
+and that the outer bars of a linear column would yield at δ_y. All stresses are over the bars' yield stress, those of
+the concrete over ρ times it. Cracks rub: r is their friction over k·δ_y. An axial force off the centre, or a load cell
+whose zero is not the column's, is the constant force e over k·δ_y.
 
-Crack closing, pinching, the return to the origin under the axial force, and a strength that is lost once while the
-cover spals, follow from the balance. That lines of unloading meet in a point is from I. D. Karsan and J. O. Jirsa,
-Behavior of concrete under compressive loadings, J. Struct. Div. ASCE 95 (1969), 2543-2563, in the form of E. Yassin,
-Nonlinear analysis of prestressed concrete structures under monotonic and cyclic loads, PhD thesis, University of
-California, Berkeley (1994); the layers of a section are those of E. Spacone, F. C. Filippou and F. F. Taucer, Fibre
+Crack closing, pinching, the return to the origin under the axial force, and strength that is lost while the cover spals
+and the core crushes, follow from the balance. That lines of unloading meet in a point is from I. D. Karsan and J. O.
+Jirsa, Behavior of concrete under compressive loadings, J. Struct. Div. ASCE 95 (1969), 2543-2563, in the form of E.
+Yassin, Nonlinear analysis of prestressed concrete structures under monotonic and cyclic loads, PhD thesis, University
+of California, Berkeley (1994); the layers of a section are those of E. Spacone, F. C. Filippou and F. F. Taucer, Fibre
 beam-column model for non-linear analysis of R/C frames, Earthquake Engng Struct. Dyn. 25 (1996), 711-725.
 
 An increment is divided so that strains follow it; what is left of its size is a share of 10⁻³ of the strength.
@@ -51,6 +53,9 @@ class LayeredParams(NamedTuple):
     sharpness: float = 18.0  # R₀ of the bars
     shaft: float = 0.6  # h, share of the flexibility that the shaft has
     focus: float = 2.0  # ε_f, strain in tension to which concrete unloads
+    core: float = 0.1  # κ, share of the spalling that the core has
+    friction: float = 0.0  # r, friction over k·δ_y
+    eccentricity: float = 0.0  # e, constant force over k·δ_y
 
 
 RULES = {
@@ -70,14 +75,19 @@ RULES = {
     "sharpness": Rule("sharpness of the first yielding of the bars", least=1.0, most=100.0),
     "shaft": Rule("share of the elastic flexibility outside the section", least=0.05, most=0.98),
     "focus": Rule("strain in tension over that at which bars yield to which concrete unloads", least=0.1),
+    "core": Rule("share of the outer layers' loss of strength that the core has", least=0.0, most=1.0),
+    "friction": Rule("friction over stiffness times yield_displacement", least=0.0, most=0.09),
+    "eccentricity": Rule("constant force over stiffness times yield_displacement", least=-1.0, most=1.0),
 }
 STIFFNESS, YIELD_DISPLACEMENT, HARDENING, CONCRETE, AXIAL, STRENGTH, SPALLING, SHARPNESS, SHAFT, FOCUS = (
     range(10)
 )
+CORE, FRICTION, ECCENTRICITY = range(10, 13)
 
 HALF = 5  # layers of concrete on either side of the middle; the outer one is the cover
 BAR, MIDDLE = 0.38, 0.25  # place of the outer bars over the depth, share of those in the middle
-LEFT, IN_CORE = 0.2, 0.1  # strength that spalled concrete keeps; share of the spalling that the core has
+LEFT = 0.2  # strength that spalled concrete keeps
+CONTACT = 0.1  # c, over the yield displacement: deformation at which friction slides
 BARS_HARDEN, LOSS, LOSS_AT = 0.01, 0.925, 0.15  # of the bars' law
 SLOPE = 1e-4  # least stiffness of concrete over its first, so that the balance can be solved
 FINEST = 0.25  # over the yield displacement, of the parts of an increment
@@ -88,12 +98,11 @@ NEAR, FAR = (
 )  # of the balance over the bars' yield force, from where on one more step ends at it; of a strain
 
 # Places in the state: δ (m) and f (N) of the last call, ε₀ and φ; of the layers of either side the farthest compression
-# and its stress; of the layers of bars their memories; then room for a step.
+# and its stress; of the layers of bars their memories; z of the friction (m); then room for a step.
 DEFORMATION, FORCE, STRAIN, CURVATURE, FARTHEST, STRESS, STEEL = 0, 1, 2, 3, 4, 4 + 2 * HALF, 4 + 4 * HALF
 MEMORY = menegotto_pinto.STATE_SIZE
-BARS = (
-    STEEL + 3 * MEMORY
-)  # and room for the parameters of the bars, for a branch that is looked at, and for sums
+SLIDER = STEEL + 3 * MEMORY
+BARS = SLIDER + 1  # and room for the parameters of the bars, for a branch that is looked at, and for sums
 SPARE = BARS + len(menegotto_pinto.MenegottoPintoParams._fields)
 SUMS = SPARE + MEMORY
 STATE_SIZE = SUMS + 5
@@ -124,7 +133,7 @@ def pressed(p: Array, size: float, farthest: float, stress: float, spalling: flo
 @jit
 def spals(p: Array, layer: int) -> float:
     """Share of its strength that a layer of concrete loses per strain."""
-    return p[SPALLING] if layer == HALF - 1 else IN_CORE * p[SPALLING]
+    return p[SPALLING] if layer == HALF - 1 else p[CORE] * p[SPALLING]
 
 
 @jit
@@ -215,9 +224,9 @@ def kept(p: Array, s: Array) -> None:
 @jit_apart
 def step(p: Array, s: Array, deformation: float) -> float:
     """Force (N) at a deformation (m) reached from that of the last call; `s` (STATE_SIZE,) is updated."""
-    moved = deformation - s[DEFORMATION]
+    moved, constant = deformation - s[DEFORMATION], p[ECCENTRICITY] * p[STIFFNESS] * p[YIELD_DISPLACEMENT]
     if moved == 0.0:
-        return s[FORCE]
+        return s[FORCE] if s[CURVATURE] != 0.0 else constant
     size, bending = at_rest(p)
     if s[FORCE] == 0.0 and s[STRAIN] == 0.0:
         s[STRAIN] = -size
@@ -232,8 +241,9 @@ def step(p: Array, s: Array, deformation: float) -> float:
         balanced(p, s, stiff * place / lever, stiff)
         kept(p, s)
     s[DEFORMATION] = deformation
+    most, rubbing = CONTACT * p[YIELD_DISPLACEMENT], p[FRICTION] / CONTACT
+    s[SLIDER] = min(max(s[SLIDER] + moved, -most), most)
+    beside = p[STIFFNESS] * (p[HARDENING] * deformation + rubbing * s[SLIDER]) + constant
     # by the shaft, whose force is the section's
-    s[FORCE] = (
-        first / shaft * (deformation - lever * s[CURVATURE]) + p[HARDENING] * p[STIFFNESS] * deformation
-    )
+    s[FORCE] = (1.0 - rubbing) * first / shaft * (deformation - lever * s[CURVATURE]) + beside
     return float(s[FORCE])

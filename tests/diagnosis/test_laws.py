@@ -156,7 +156,8 @@ def test_a_parameter_that_a_law_lacks_is_not_fitted() -> None:
         },
         **{place: {"yield_displacement", *Driven.TRUE} for place in (6, 8, 10)},
         11: {"yield_displacement", "hardening", "exponent"}
-        | {"concrete", "axial", "strength", "spalling", "shaft", "focus"},
+        | {"concrete", "axial", "strength", "spalling", "shaft", "focus"}
+        | {"core", "friction", "eccentricity", "uncracked"},
         12: {"yield_displacement", "hardening", "exponent", "loop"},
     }
 

@@ -77,6 +77,7 @@ def test_every_effect_is_in_the_updated_plan_or_listed_once(name: str) -> None:
             ("column.yielding", {"yield_displacement": 1e-3, "hardening": 0.1, "law": law})
             for law in (0.0, 1.0, 3.0)
         ),
+        ("column.yielding", {"yield_displacement": 1e-3, "law": 11.0, "uncracked": 1.3, "friction": 0.02}),
         ("column.self_centring", {"displacement": 1e-3}),
         ("column.viscous", {"coefficient": 4e4}),
         ("column.inertia", {"mass": 600.0}),

@@ -8,7 +8,7 @@ from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.laws.best import FARTHEST, FITTED, ROUGH, ROUNDS, cost, descended, fitted
-from diagnosis.fits.laws.specimen import as_specimen, follow, path, within
+from diagnosis.fits.laws.specimen import UNCRACKED, as_specimen, follow, path, within
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import leaves
 from laboratories.effects.effect import Effect
@@ -93,7 +93,8 @@ def beside(fit: Fit, effect: Effect, place: int, found: SpecimenFit) -> Values:
     catalogue, law = fit.data.catalogue, effect.laws[place]
     (strength,) = (item for item in effect.parameters if not item.shape)
     base = effect.under(place, effect.values({strength.name: 0.0}))
-    result = {effect.name: base | as_specimen(effect, law, strength, found.parameters)}
+    planned = fit.data.system.plan.column.stiffness
+    result = {effect.name: base | as_specimen(effect, law, strength, found.parameters, planned)}
     for name, renamed in law.beside.items():
         other = catalogue[name]
         index = next(
@@ -102,9 +103,9 @@ def beside(fit: Fit, effect: Effect, place: int, found: SpecimenFit) -> Values:
         bounds = {item.name: item for item in other.every}
         given = {key: within(bounds[key], found.parameters[value]) for key, value in renamed.items()}
         result[name] = {"law": float(index)} | given
-    if law.beside:
+    if law.beside or UNCRACKED in law.shapes:
         return result
-    factor = found.parameters["stiffness"] / fit.data.system.plan.column.stiffness
+    factor = found.parameters["stiffness"] / planned
     if STIFFNESS not in catalogue or 1.0 / OTHERWISE < factor < OTHERWISE:
         return result
     (parameter,) = catalogue[STIFFNESS].parameters

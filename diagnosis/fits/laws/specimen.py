@@ -18,6 +18,7 @@ from models.specimens.fit import SpecimenFit
 
 SLOW = ("layered",)  # models whose fit takes ten times as long as another's
 CLOSELY = 0.03  # of a force's rms: a model that leaves less has the specimen's loops
+UNCRACKED = "uncracked"  # of a law with a first stiffness of its own: that over the planned one
 BETTER = 0.8  # of what the best other model leaves: less of it is worth a model that takes long
 
 
@@ -71,11 +72,16 @@ def following(model: str, deformation: bytes, force: bytes) -> SpecimenFit:
 
 
 def as_specimen(
-    effect: Effect, law: Law, strength: Parameter, found: Mapping[str, float]
+    effect: Effect, law: Law, strength: Parameter, found: Mapping[str, float], planned: float
 ) -> dict[str, float]:
-    """The parameters of an effect under a law from those of the specimen that it is."""
+    """The parameters of an effect under a law from those of the specimen that it is.
+
+    `planned` is the stiffness in the plan, N/m.
+    """
     known = {item.name: item for item in effect.every}
     values = dict(found)
+    if UNCRACKED in law.shapes:
+        values[UNCRACKED] = values["stiffness"] / planned
     if "first_bend" in values.keys() - law.shapes.keys():  # without it the law yields at the same force
         bend = values["first_bend"]
         values["yield_displacement"] *= bend + values["second_stiffness"] * (1.0 - bend)

@@ -35,7 +35,8 @@ def starts(
     base, law = effect.under(place, fit.values[effect.name]), effect.laws[place]
     (strength,) = (item for item in effect.parameters if not item.shape)
     if law.model in followed:
-        yield base | as_specimen(effect, law, strength, followed[law.model])
+        planned = fit.data.system.plan.column.stiffness
+        yield base | as_specimen(effect, law, strength, followed[law.model], planned)
         return
     ways = itertools.product(NEARER.tolist(), shapes(fit, effect, place), stiff(fit, effect, law))
     for share, shape, spring in ways:

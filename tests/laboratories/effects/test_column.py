@@ -314,12 +314,15 @@ def test_the_further_laws_of_yielding_equal_the_specimen_models_of_that_name(nam
 
 def test_the_law_of_layers_equals_the_specimen_model_of_that_name() -> None:
     path = through(2e-3, -3e-3, 2.5e-3, -1e-3)
-    section = {"concrete": 4.0, "axial": 0.3, "spalling": 0.1, "shaft": 0.7, "focus": 1.5}
+    section = {"concrete": 4.0, "axial": 0.3, "spalling": 0.1, "shaft": 0.7, "focus": 1.5, "core": 0.4}
+    section |= {"eccentricity": -0.02}
     law = float(specimen.LAWS.index("layered"))
     more: dict[str, Any] = {"yield_displacement": 1e-3, "hardening": -0.01, "law": law, **section}
-    got = specimen_under(path, ColumnEffects(**more, concrete_strength=0.6, exponent=12.0))
-    given = {"stiffness": K, "yield_displacement": 1e-3, "hardening": -0.01, **section}
-    expected = forces("layered", {**given, "strength": 0.6, "sharpness": 12.0}, path.astype(np.float64))
+    further: dict[str, Any] = {"concrete_strength": 0.6, "exponent": 12.0, "rubbing": 0.03, "uncracked": 1.3}
+    got = specimen_under(path, ColumnEffects(**more, **further))
+    given = {"stiffness": 1.3 * K, "yield_displacement": 1e-3, "hardening": -0.01, **section}
+    given |= {"strength": 0.6, "sharpness": 12.0, "friction": 0.03}
+    expected = forces("layered", given, path.astype(np.float64))
     assert np.allclose(got, expected, rtol=1e-9, atol=1e-6)
 
 

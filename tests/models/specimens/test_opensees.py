@@ -152,7 +152,7 @@ def section_moments(ops: Any, curvatures: Array, more: dict[str, float]) -> Arra
     ops.model("basic", "-ndm", 2, "-ndf", 3)
     ops.uniaxialMaterial("Steel02", 1, 1.0, 1.0, layered.BARS_HARDEN, more["sharpness"], 0.925, 0.15)
     strength, layers = more["strength"], 2 * layered.HALF
-    for tag, spalling in ((2, layered.IN_CORE * more["spalling"]), (3, more["spalling"])):
+    for tag, spalling in ((2, more["core"] * more["spalling"]), (3, more["spalling"])):
         left, end = layered.LEFT * strength, 2.0 * strength + (1.0 - layered.LEFT) / spalling
         ratio = (more["focus"] + left) / (more["focus"] + end)  # with which their common point is that focus
         ops.uniaxialMaterial("Concrete02", tag, -strength, -2.0 * strength, -left, -end, ratio, 1e-9, 1.0)
@@ -185,12 +185,15 @@ def section_moments(ops: Any, curvatures: Array, more: dict[str, float]) -> Arra
     return np.array(result)
 
 
-@pytest.mark.parametrize(("axial", "focus", "rms"), [(0.4, 2.0, 0.015), (1.0, 2.0, 0.03), (0.1, 5.0, 0.005)])
+@pytest.mark.parametrize(
+    ("axial", "focus", "core", "rms"),
+    [(0.4, 2.0, 0.1, 0.015), (1.0, 2.0, 0.1, 0.03), (0.1, 5.0, 0.1, 0.005), (0.4, 2.0, 0.8, 0.015)],
+)
 def test_layered_follows_a_fibre_section_of_concrete02_and_steel02(
-    ops: Any, axial: float, focus: float, rms: float
+    ops: Any, axial: float, focus: float, core: float, rms: float
 ) -> None:
     # theirs reloads concrete along two lines in the place of one
-    more = {"concrete": 5.0, "axial": axial, "strength": 0.5, "spalling": 0.15, "focus": focus}
+    more = {"concrete": 5.0, "axial": axial, "strength": 0.5, "spalling": 0.15, "focus": focus, "core": core}
     more |= {"sharpness": 18.0, "shaft": 0.6}
     corners = np.array([0.0, 2.0, -2.0, 4.0, -4.0, 1.0, 8.0, -3.0, -1.0, -8.0, 8.0, 0.0]) * 2.0
     curvatures = np.concatenate([np.linspace(a, b, 401)[1:] for a, b in pairwise(corners)])

@@ -16,7 +16,8 @@ with yield displacement δ_y, hardening α and exponent n. The parameter `law` c
     9   pinched, with the corner of reloading at a share of the deformation that is left where the peak is unloaded
     10  the same with a trilinear skeleton
     11  reinforced concrete: a section of layers of concrete and bars under an axial force, and an elastic shaft; R₀ of
-        the bars is the exponent, and what leans on the column makes the hardening negative
+        the bars is the exponent, and what leans on the column makes the hardening negative; it has a first stiffness of
+        its own, because a planned one is seldom that of concrete without cracks
     12  the endochronic law (K. C. Valanis, Archives of Mechanics 23 (1971), 517-551; Z. P. Bažant and P. D. Bhat, J.
         Eng. Mech. Div. ASCE 102 (1976), 701-722), dz/dδ = (1 − |z|ⁿ·sgn(z·dδ)) / δ_y, which unloads by up to twice the
         elastic stiffness: with `loop` β in general Bouc and Wen's 1 − |z|ⁿ·(1 − β + β·sgn(z·dδ)), where 0.5 is law 0
@@ -52,6 +53,10 @@ LAYERS = {
     "spalling": 0.15,
     "shaft": 0.6,
     "focus": 2.0,
+    "core": 0.5,
+    "friction": 0.02,
+    "eccentricity": 0.0,
+    "uncracked": 1.0,
 }
 
 
@@ -190,6 +195,20 @@ EFFECT = sets(
         "focus": of_layers(
             "focus", 2.0, 0.1, 100.0, "strain in tension over that of yielding bars to which concrete unloads"
         ),
+        "core": of_layers(
+            "core", 0.1, 0.0, 1.0, "share of the outer layers' loss of strength that the core has"
+        ),
+        "rubbing": of_layers(
+            "friction", 0.0, 0.0, 0.09, "friction of cracks over the first stiffness times yield_displacement"
+        ),
+        "eccentricity": of_layers(
+            "eccentricity",
+            0.0,
+            -1.0,
+            1.0,
+            "constant force over the same, of an axial force off the centre or of a load cell's zero",
+        ),
+        "uncracked": of_layers("uncracked", 1.0, 0.3, 5.0, "first stiffness over the planned one"),
         "yield_loop": Parameter(
             "loop",
             "",
