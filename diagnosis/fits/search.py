@@ -53,7 +53,7 @@ class Search:
 def search(data: Data, scales: Scales) -> Search:
     """What was found in a part, beside a resonance that its inputs swing where nothing else is left to explain."""
     found, fine = at_any_size(data, scales)
-    swings = None if fine is None else resonant(fine, model_error(fine))
+    swings = None if fine is None else resonant(fine)
     return found if swings is None else at_any_size(replace(data, related=swings), scales)[0]
 
 

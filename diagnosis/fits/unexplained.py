@@ -113,12 +113,12 @@ def is_foreseen(found: list[Foreseen], allowed: Array) -> bool:
     )
 
 
-def resonant(fit: Fit, allowed: Array) -> Crosswise | None:
+def resonant(fit: Fit) -> Crosswise | None:
     """What may follow from a part's inputs with the resonance that its residual shows; None where it shows none.
 
     The resonance is looked for in the residual as it is, and taken away from what counts as noise. Then it must be
     foreseen of a residual that is whitened with this noise, stretch by stretch from frequencies and sizes that are
-    found elsewhere, by more than is `allowed` in its signal (signals,), over σ.
+    found elsewhere, by more than two good solutions of one model may differ by.
     """
     data, part = fit.data, fit.data.part
     if part.exact or isinstance(part, LoggedBuilding) or data.related is None:
@@ -132,4 +132,4 @@ def resonant(fit: Fit, allowed: Array) -> Crosswise | None:
     related = data.related.beside(resonances.columns(left))
     beside = fitting.at(sensor_noise.modelled(replace(data, related=related), system), fit.values, fit.z)
     found = sensor_noise.told(beside, resonances.predict(beside.reduced))
-    return related if is_foreseen(found, allowed) else None
+    return related if is_foreseen(found, model_error(beside)) else None

@@ -97,7 +97,7 @@ def test_a_laboratory_in_which_nothing_swings_has_no_resonance(cases: Cases) -> 
     whole = cases.record({}, duration=12.0)
     for part in (lab_a(whole), lab_b(whole)):
         fit = settling.settled(fitting.fit(residuals.prepare(part, whole).fine, {}))
-        assert resonant(fit, model_error(fit)) is None
+        assert resonant(fit) is None
 
 
 def test_a_mass_that_swings_on_the_table_is_named_where_it_looked_like_noise(cases: Cases) -> None:
