@@ -208,8 +208,8 @@ def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fi
     if len(fit.names) == len(chosen.names) or remaining(fit) > most or (faint and worth.is_gap(fit)):
         return chosen
     fit = needed(fit, most)
-    usual = fit.prior < max(worth.SUSPICIOUS, chosen.prior)
-    return fit if usual and len(fit.names) > len(chosen.names) else chosen
+    likely = fit.prior < max(worth.usual(fit), chosen.prior)
+    return fit if likely and len(fit.names) > len(chosen.names) else chosen
 
 
 def wanting(fit: Fit) -> bool:

@@ -210,7 +210,7 @@ def two_for_one(fit: Fit, rivals: Sequence[Fit], scales: Scales, most: int) -> F
     `rivals` are fits with one effect exchanged, best first. One effect may do what two do, as a compliance what a gain
     and a time constant do, if nominal parameters do the rest.
     """
-    if fit.prior <= worth.SUSPICIOUS or len(fit.names) < 2 or len(fit.names) >= most:
+    if fit.prior <= worth.usual(fit) or len(fit.names) < 2 or len(fit.names) >= most:
         return fit
     others: list[Fit] = []
     for rival in [item for item in rivals if len(item.names) == len(fit.names)][:RIVALS]:

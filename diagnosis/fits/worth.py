@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import special
 
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit, excess
@@ -11,8 +12,11 @@ from models.registry import Array
 
 # The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
 # between effects that are overlooked and effects that are named without a cause.
-PRIOR_GAIN, DATA_GAIN = 6.25, 25.0  # 2.5 tolerances squared; 5 standard deviations squared
-SUSPICIOUS = 8.0  # of Σ z²: nominal parameters that are all off together imitate an effect
+DATA_GAIN = 25.0  # 5 standard deviations squared
+# 3.2 tolerances squared. A tolerance is a standard deviation: of fourteen parameters, as the test of the paper has,
+# one is farther off by chance in one laboratory of fifty.
+PRIOR_GAIN = 10.24
+BY_CHANCE = 0.02  # of laboratories have nominal parameters that are all further off together
 
 # A further effect explains
 REST = 0.85  # this share of what is left,
@@ -36,13 +40,18 @@ def is_gap(fit: Fit) -> bool:
 def strained(fit: Fit) -> bool:
     """Whether nominal parameters have moved too far: all of them together, or one."""
     far = float(np.max(np.abs(fit.z), initial=0.0)) ** 2 > PRIOR_GAIN
-    return fit.prior > SUSPICIOUS or far
+    return fit.prior > usual(fit) or far
+
+
+def usual(fit: Fit) -> float:
+    """Most that Σ z² of nominal parameters is by chance: what one alone may be off, or what χ² says of all of them."""
+    return max(PRIOR_GAIN, float(special.chdtri(max(fit.z.size, 1), BY_CHANCE)))
 
 
 def enough(bare: Fit, fit: Fit) -> bool:
     """Whether the residual is too small for a further effect to be worth it."""
     return not is_gap(fit) or (
-        excess(fit) < TRACE * min(moving(bare), bare.data.energy) and fit.prior <= SUSPICIOUS
+        excess(fit) < TRACE * min(moving(bare), bare.data.energy) and not strained(fit)
     )
 
 

@@ -85,12 +85,12 @@ def test_an_effect_that_brings_nominal_parameters_back_is_kept_beside_a_fit_that
     assert len(trade.released(fit({"a": {}}, before), None)) == kept  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("z", "names"), [(2.4, ("a",)), (2.6, ("a", "b"))])
+@pytest.mark.parametrize(("z", "names"), [(3.1, ("a",)), (3.3, ("a", "b"))])
 def test_a_simpler_description_stands_unless_it_moves_a_nominal_parameter_too_far(
     monkeypatch: pytest.MonkeyPatch, z: float, names: tuple[str, ...]
 ) -> None:
     monkeypatch.setattr(trade, "freedom", lambda item: (len(item.names), len(item.names)))
-    stands, others = trade.simplest([fit({"a": {}}, z), fit({"a": {}, "b": {}})])
+    stands, others = trade.simplest([fit({"a": {}}, z), fit({"a": {}, "b": {}}, 1.4)])
     assert stands.names == names
     assert len(others) == 1
 

@@ -68,7 +68,9 @@ def test_an_effect_beside_three_is_found_by_the_nominal_parameter_that_stands_in
 def test_a_faint_rest_is_not_filled_up_with_effects(
     monkeypatch: pytest.MonkeyPatch, before: float, after: float, count: int, taken: bool
 ) -> None:
-    one, two = SimpleNamespace(names=("a",), prior=0.0), SimpleNamespace(names=("a", "b"), prior=0.0)
+    z = np.zeros(1)
+    one = SimpleNamespace(names=("a",), prior=0.0, z=z)
+    two = SimpleNamespace(names=("a", "b"), prior=0.0, z=z)
     monkeypatch.setattr("diagnosis.fits.search.count", lambda _: count)
     monkeypatch.setattr(worth, "strained", lambda _: False)
     monkeypatch.setattr(worth, "is_gap", lambda fit: fit is one or after > 0.1)

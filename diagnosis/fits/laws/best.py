@@ -16,7 +16,7 @@ from diagnosis.fits.laws.starts import starts
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import remaining
-from diagnosis.fits.worth import SUSPICIOUS
+from diagnosis.fits.worth import usual
 from laboratories.effects.effect import Effect
 from models.registry import Array
 
@@ -56,7 +56,7 @@ def in_best_laws(fits: list[Fit], *, modelled: bool = True) -> list[Fit]:
 
 def whole(fit: Fit) -> bool:
     """Whether a fit leaves too little to be seen, with nominal parameters that stand in for nothing."""
-    return remaining(fit) < SLIGHT and fit.prior <= SUSPICIOUS
+    return remaining(fit) < SLIGHT and fit.prior <= usual(fit)
 
 
 def ending(better: list[Fit], fits: list[Fit]) -> list[Fit]:
