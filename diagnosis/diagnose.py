@@ -46,7 +46,6 @@ from diagnosis.recorded.link.exchange import LinkFinding
 from diagnosis.recorded.logged_building import LoggedBuilding, logged
 from diagnosis.recorded.parts import Building, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
-from diagnosis.recorded.sampled_together import sampled_together
 from models.registry import Array
 from models.system import System
 
@@ -99,7 +98,7 @@ def diagnose(
 
 def put_right(record: Record) -> Record:
     """A record on the clock of its commands, with what its logger did to its readings and its map does not state."""
-    return filters.filtered(logger.clocked(sampled_together(record)))
+    return filters.filtered(logger.clocked(record))
 
 
 def among(record: Record, systems: Mapping[str, System]) -> Record:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from laboratories.column import model as column_lab
 from laboratories.column import specimen
@@ -35,8 +36,15 @@ def laboratory(
     return read(kind, system, motion(kind, system, drive, start, anew))
 
 
-def motion(kind: Kind, system: System, drive: Array, start: float = 0.0, anew: Array | None = None) -> Array:
-    """What sensors without error would read, (ticks, channels), as `laboratory`; the same for any sensors."""
+def motion(
+    kind: Kind, system: System, drive: Array, start: float = 0.0, anew: Array | None = None, steps: int = 0
+) -> Array:
+    """What sensors without error would read, (ticks, channels), as `laboratory`; the same for any sensors.
+
+    With `steps` an interval is played in so many, and the command of a tick is reached there: a logger sampled it.
+    """
+    if steps > 0:
+        return motion(kind, *sampled(system, drive, anew, start, steps))[::steps]
     ticks, interval = drive.shape[0], system.plan.test.interval
     played = silent(kind, system.unread, ticks)
     if start != 0.0:
@@ -45,10 +53,28 @@ def motion(kind: Kind, system: System, drive: Array, start: float = 0.0, anew: A
     begun = begun[begun[:, 0] < ticks]
     borders = [0, *begun[:, 0].astype(int).tolist(), ticks]
     site.play(played, drive, interval, 0, borders[1])
-    for place, (_, motion, rate) in enumerate(begun.tolist(), 1):
-        kind.resume(played.lab, played.truth, motion, rate)
+    for place, (_, position, rate) in enumerate(begun.tolist(), 1):
+        kind.resume(played.lab, played.truth, position, rate)
         site.play(played, drive, interval, borders[place], borders[place + 1])
     return played.measured
+
+
+def sampled(
+    system: System, drive: Array, anew: Array | None, start: float, steps: int
+) -> tuple[System, Array, float, Array | None]:
+    """System, commands, start and beginnings, as `motion` takes them, of commands that a logger sampled.
+
+    Between its rows they go on a cubic spline. The transfer system's command goes straight to its value at the end of
+    each of the `steps` of an interval, and a motor's is held at that in the middle, with a single step at the row's.
+    """
+    test, ticks = system.plan.test, len(drive)
+    plan = replace(system.plan, test=replace(test, interval=test.interval / steps))
+    places = np.arange((ticks - 1) * steps + 1, dtype=np.float64)
+    spline = CubicSpline(np.arange(ticks), drive)
+    ahead = (1.0, 0.0 if steps == 1 else 0.5)
+    rows = [spline(np.minimum((places + part) / steps, ticks - 1))[:, k] for k, part in enumerate(ahead)]
+    begun = None if anew is None else anew * np.array([steps, 1.0, 1.0])
+    return replace(system, plan=plan), np.column_stack(rows), start, begun
 
 
 def read(kind: Kind, system: System, values: Array) -> Array:

@@ -8,7 +8,7 @@
         seen = stated.through(prediction, interval)      # as that logger would have recorded of a prediction
         step = stated.resolution                         # m, N, …: of a converter or of printed decimals
         gain = stated.calibration                        # relative tolerance of the channel's gain
-        found.static, stated.interpolated, stated.rate
+        found.static, found.gaps, stated.interpolated, stated.rate
 
 Values that the import map does not state are zero or None, which means that they are unknown. A recording whose
 `import` record holds only the name of its data states nothing about any channel.
@@ -142,6 +142,7 @@ class ImportedData:
     static: bool = False  # times have no meaning, so the data show no rates and no dynamics of sensors
     channels: Mapping[str, Mapping[str, ImportedChannel]] = field(default_factory=dict)
     as_is: bool = False  # units and signs are not checked for plausibility, at the user's request
+    gaps: tuple[tuple[float, float], ...] = ()  # s of the test, between which rows are missing
 
     def channel(self, topic: str, name: str) -> ImportedChannel:
         """What is stated about a signal; `NOTHING_STATED` for one that the map does not name."""
@@ -158,7 +159,8 @@ class ImportedData:
             topic: {name: _plain(row) for name, row in rows.items()} for topic, rows in self.channels.items()
         }
         flags = {"static": json.dumps(self.static), "as_is": json.dumps(self.as_is)}
-        return {"data": self.data, **flags, "channels": json.dumps(tables)}
+        gaps = {"gaps": json.dumps(self.gaps)} if self.gaps else {}
+        return {"data": self.data, **flags, **gaps, "channels": json.dumps(tables)}
 
 
 def imported(run: Run) -> ImportedData | None:
@@ -176,7 +178,8 @@ def imported(run: Run) -> ImportedData | None:
             for topic, rows in json.loads(values.get("channels", "{}")).items()
         }
         static, as_is = (json.loads(values.get(name, "false")) for name in ("static", "as_is"))
-        return ImportedData(values.get("data", ""), bool(static), channels, bool(as_is))
+        gaps = tuple((float(begin), float(end)) for begin, end in json.loads(values.get("gaps", "[]")))
+        return ImportedData(values.get("data", ""), bool(static), channels, bool(as_is), gaps)
     except (ValueError, TypeError, AttributeError):
         raise InputError(
             f"{run.path} is damaged: its metadata '{IMPORT}' cannot be read; import the data again."

@@ -168,6 +168,8 @@ def least_late(found: Diagnosis) -> dict[str, float]:
     """By how much all readings of forces, and all others, are late at least, s; their names in texts first."""
     delays: dict[str, list[float]] = {}
     for name, (delay, _) in found.logger.items():
+        if not found.record.has(name):
+            continue
         forces = found.record.unit(name) == "N"
         delays.setdefault("All readings of forces" if forces else "All readings but forces", []).append(delay)
     return {names: min(those) for names, those in delays.items()}

@@ -11,8 +11,9 @@ from diagnosis.findings.gaps import QUIET
 from diagnosis.findings.verdict import PartVerdict, heard
 from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.residuals import Data
+from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.logged_building import BALANCE
-from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import NoiseEntry, PartOfGap
 from diagnosis.signals.noise_model import NoiseModel

@@ -20,7 +20,6 @@ from diagnosis.fits import sensor_noise
 from diagnosis.fits.settling import SMALL
 from diagnosis.recorded.nuisances import LoggedForce, LoggedReadings
 from diagnosis.recorded.record import Record
-from diagnosis.recorded.sampled_together import factor_as_planned
 from diagnosis.report.records import HowFar, Place, Report, Status, Tolerance
 
 # Warning where the effects of a part explain its readings and the test is as far from its simulation as before.
@@ -32,6 +31,7 @@ UNLIKE = (
     "The effects named explain this recording, but leave more than a fifth of the gap on the recordings given for "
     "validation: their law is another one, or a further cause shows there."
 )
+RARE = 2.5  # tolerances that a parameter is rarely off: one of fourteen in one laboratory of six
 STILL = 5.0  # rms of a signal over its noise below which nothing is judged: its noise alone is a gap of 20 %
 
 
@@ -72,6 +72,7 @@ def build(
             *named.warnings,
             *([] if shrunk else [open_gap(far.how_far)]),
             *doubts,
+            *rarely_off(found),
         ),
         parts=parts_table.parts(found, require),
         details=details.details(found, far, named.candidates, tests, signs),
@@ -144,9 +145,20 @@ def tolerances(found: Diagnosis) -> dict[str, Tolerance]:
         for nuisance, z in zip(verdict.search.data.part.nuisances, fit.z, strict=True):
             if isinstance(nuisance, LoggedForce | LoggedReadings):
                 continue
-            factor = factor_as_planned(found.record, nuisance, float(z))
-            result[nuisance.name] = Tolerance(factor=factor, z=float(z))
+            result[nuisance.name] = Tolerance(factor=1.0 + float(z) * nuisance.tolerance, z=float(z))
     return result
+
+
+def rarely_off(found: Diagnosis) -> list[str]:
+    """Sentences on nominal parameters that explain a gap alone, but are rarely as far off."""
+    return [
+        f"{nuisance.name} is {abs(z):.1f} tolerances {'above' if z > 0.0 else 'below'} its value in the plan, which is "
+        "rare: measure it again, or state a wider tolerance."
+        for verdict in found.verdicts
+        if verdict.outcome == "tolerances"
+        for nuisance, z in zip(verdict.search.data.part.nuisances, verdict.search.chosen.z, strict=True)
+        if abs(z) > RARE and not nuisance.of_record
+    ]
 
 
 def sites_of(found: Diagnosis, far: how_far.Response) -> tuple[Place, ...]:

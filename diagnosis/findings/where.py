@@ -16,7 +16,7 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.unexplained import gaps
 from diagnosis.fits.worth import SEEN
-from diagnosis.recorded.parts import ColumnAlone
+from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
 from models.registry import Array

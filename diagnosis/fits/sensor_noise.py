@@ -17,9 +17,10 @@ from scipy import signal
 from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
+from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.logged_building import LoggedBuilding
-from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
+from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.signals import colour, pickup
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.noise_model import NoiseModel, Source

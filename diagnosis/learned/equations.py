@@ -16,7 +16,8 @@ from scipy.signal import lfilter
 from common.plan.kinds import COLUMN, TABLE
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
-from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
+from diagnosis.recorded.column_alone import ColumnAlone
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.systematic import systematic
 from loop import replay

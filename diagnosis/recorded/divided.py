@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from common.plan.kinds import COLUMN
+from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.ground import Ground
+from diagnosis.recorded.known import with_known_commands
 from diagnosis.recorded.laboratory import RecordedLaboratory
-from diagnosis.recorded.parts import Building, ColumnAlone, LaboratoryPart, Part
+from diagnosis.recorded.parts import Building, LaboratoryPart, Part
 from diagnosis.recorded.record import Record
 
 BUILDING = ("ground_acceleration", "displacement")
@@ -22,7 +24,7 @@ def parts_of(record: Record) -> list[Part]:
         parts.append(Building(record))
     for lab in record.labs:
         if driven(record, lab):
-            parts.append(LaboratoryPart(record, lab))
+            parts.append(with_known_commands(LaboratoryPart(record, lab), record))
         elif lab.kind.name == COLUMN and record.has(*lab.measured):
             parts.append(ColumnAlone(record, lab))
     return [part for part in parts if np.any(part.measured)]

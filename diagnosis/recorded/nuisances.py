@@ -23,6 +23,9 @@ LATE = 4e-3  # s
 ALIKE = 5e-4  # s
 UNLIKE = 0.5
 CALIBRATED = 0.01
+EVENLY = 1.0 / math.sqrt(
+    12.0
+)  # standard deviation of what is anywhere between two bounds, over their distance
 # Standard deviation of the delay of a stated filter. PASSING: an analogue filter's parts are good to some per cent, and
 # a digital one that loses 3 dB at the same frequency, 100 Hz sampled at 500 Hz, delays slow motion by 13 % less.
 # BETWEEN: what readings do between ticks, as after the steps of a command, is known no better.
@@ -163,28 +166,41 @@ def channels(stated: ImportedData | None, lab: RecordedLaboratory) -> tuple[Impo
     return tuple(stated.channel(lab.role, name) for name in lab.kind.channels.names)
 
 
-def of_logger(lab: RecordedLaboratory, late: Late, spread: float | None) -> tuple[LoggedReadings, ...]:
+def of_logger(
+    lab: RecordedLaboratory, late: Late, spread: float | None, held: float = 0.0
+) -> tuple[LoggedReadings, ...]:
     """Delays of force readings and of the others by a logger of which nothing is stated, about those found elsewhere.
 
-    `spread` is their standard deviation, s; None for what is usual.
+    `spread` is their standard deviation, s; None for what is usual. A command may be `held` for so long, s.
     """
     rows, groups = lab.kind.channels.measured, ((late.force, True), (late.motion, False))
     return tuple(
-        LoggedReadings("delay", spread or math.hypot(max(ALIKE, UNLIKE * about), unsure), lab, those, about)
+        LoggedReadings(
+            "delay",
+            spread or math.hypot(max(ALIKE, UNLIKE * about), unsure, EVENLY * held),
+            lab,
+            those,
+            about,
+        )
         for (about, unsure), force in groups
         if (those := tuple(row.name for row in rows if (row.unit == "N") == force))
     )
 
 
-def of_filters(lab: RecordedLaboratory, stated: Sequence[ImportedChannel]) -> tuple[LoggedReadings, ...]:
-    """By how much forces, and other readings, of which a filter is stated are late beyond that and their delay."""
+def of_filters(
+    lab: RecordedLaboratory, stated: Sequence[ImportedChannel], held: float = 0.0
+) -> tuple[LoggedReadings, ...]:
+    """By how much forces, and other readings, of which a filter is stated are late beyond that and their delay.
+
+    A command may be `held` for so long, s.
+    """
     result = []
     for force in (True, False):
         rows = zip(lab.kind.channels.measured, stated, strict=True)
         those = {row.name: one.filter for row, one in rows if one.filter and (row.unit == "N") == force}
         if those:
             late = max(ImportedChannel(one).late for one in those.values())
-            known = math.hypot(PASSING * late, BETWEEN)
+            known = math.hypot(PASSING * late, BETWEEN, EVENLY * held)
             result.append(LoggedReadings("delay", known, lab, tuple(those), least=-late))
     return tuple(result)
 

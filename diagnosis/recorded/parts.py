@@ -45,6 +45,7 @@ UNREST = 0.05  # first value over the largest one from which on a record does no
 # all that is faster; a cubic over REACH ticks to each side (20 ms) gives its place and rate there. 0.1 N on 100 kg
 # moves it by 30 µm in a piece, 1 N that changes sign every 10 mm at 0.2 m/s by 3 µm.
 PIECE, REACH = 0.25, 10
+BENT = 8  # times as many steps, in which a command that bends is all but straight
 # Systems of which a part keeps what they did: as many as the slopes of a fit take, and no more numbers than these.
 PLAYED, NUMBERS = 8, 4_000_000
 # Difference of two good solutions of one model over a measured signal's rms; nothing below is a gap where effects are
@@ -89,7 +90,7 @@ def cut(part: Any, ticks: int, inputs: Any) -> Any:
 def with_fields(part: Any, fields: dict[str, Any]) -> Any:
     """A copy of a part with some of its fields replaced, which has not played any system yet."""
     result = copy.copy(part)
-    for name, value in ({"played": ()} | fields).items():
+    for name, value in ({"played": (), "curved": None} | fields).items():
         setattr(result, name, value)
     return result
 
@@ -132,14 +133,14 @@ class LaboratoryPart:
 
     exact = False
     played: tuple[tuple[System, Array], ...] = ()  # systems with what they did, the newest last
+    curved: Array | None = None  # what `bends` gives
 
     def __init__(self, record: Record, lab: RecordedLaboratory) -> None:
         self.lab, self.name, self.role = lab, lab.title, lab.role
         self.signals = lab.measured
         self.devices = lab.commands
         self.units = {name: record.unit(name) for name in self.devices}
-        none = np.zeros(record.ticks)
-        self.inputs = {name: record.signals.get(name, none) for name in self.devices}
+        self.inputs = {name: record.signals.get(name, np.zeros(record.ticks)) for name in self.devices}
         self.wanted = self.targets(record)
         self.measured, self.present = outputs(record, self.signals)
         machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]
@@ -147,6 +148,7 @@ class LaboratoryPart:
         names = tuple(name for machine in seen for name in machine.parameters)
         self.channels = channels(record.stated, lab)
         self.free = nothing_stated(record.mapped, lab)
+        self.steps = record.steps
         self._interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)
@@ -195,7 +197,7 @@ class LaboratoryPart:
         drive += [none] * (2 - len(drive))
         found = replay.read(self.lab.kind, system, self.motion(system.unread, drive))
         passed = [channel.filter is not None for channel in self.channels]
-        if any(passed):
+        if any(passed) and not self.steps:
             found += np.where(passed, self.lab.kind.between_ticks(system, np.stack(drive, axis=1)), 0.0)
         for place, channel in enumerate(self.channels):
             made = system.effects.sensors.get(self.lab.kind.channels.names[place])
@@ -235,9 +237,27 @@ class LaboratoryPart:
         known = next((motion for played, motion in self.played if played == system), None)
         if known is not None:
             return known
-        found = replay.motion(self.lab.kind, system, np.stack(drive, axis=1), self._start, self.anew)
+        found = self.stepped(system, drive, self.steps)
+        if self.steps:
+            found = found + self.bends(drive)
         self.played = (*self.played, (system, found))[-max(1, min(PLAYED, NUMBERS // found.size)) :]
         return found
+
+    def stepped(self, system: System, drive: list[Array], steps: int) -> Array:
+        """What sensors without error would read, (ticks, channels), with so many steps an interval."""
+        return replay.motion(self.lab.kind, system, np.stack(drive, axis=1), self._start, self.anew, steps)
+
+    def bends(self, drive: list[Array]) -> Array:
+        """What a command that bends within a step adds to straight lines, (ticks, channels), by the plan's laboratory.
+
+        Straight lines over a step h take (ω·h)²/12 of what a servo of frequency ω is commanded. That depends on what a
+        fit moves in the second order only.
+        """
+        if self.curved is None:
+            plan = System(self.lab.plan).unread
+            few, many = (self.stepped(plan, drive, steps) for steps in (self.steps, BENT * self.steps))
+            self.curved = many - few
+        return self.curved
 
     def beginnings(self, record: Record) -> Array | None:
         """Ticks, displacements and rates from which a motion without a restoring force is replayed anew.
@@ -285,11 +305,11 @@ class LaboratoryPart:
     def logged(self, late: Late, spread: float | None = None) -> LaboratoryPart:
         """The same laboratory with readings from a logger that delayed forces and other channels.
 
-        What a logger does to one channel it mostly does to all, to forces as to the others, which have amplifiers of
-        their own; `spread` is the standard deviation of their delays, s. Where a delay or a calibration is stated for a
-        channel, that is not changed; a filter that is stated is known to a tenth of its delay.
+        What it does to one channel it mostly does to all, to forces as to the others; `spread` is the standard
+        deviation of their delays, s. A stated delay or calibration stays; a stated filter's delay is known to a tenth.
         """
-        delays = of_logger(self.lab, late, spread) if self.free else of_filters(self.lab, self.channels)
+        lab, held = self.lab, self._interval if self.steps else 0.0
+        delays = of_logger(lab, late, spread, held) if self.free else of_filters(lab, self.channels, held)
         if any(channel.calibration > 0.0 for channel in self.channels):
             return self.replaced(nuisances=(*self.nuisances, *delays))
         gain = LoggedReadings("gain", CALIBRATED, self.lab, self.lab.kind.channels.names)
@@ -298,33 +318,6 @@ class LaboratoryPart:
     def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""
         return with_fields(self, fields)
-
-
-class ColumnAlone(Measured):
-    """The column replayed from its measured deformation, where no actuator command was recorded."""
-
-    name = "column"
-    exact = False
-
-    def __init__(self, record: Record, lab: RecordedLaboratory) -> None:
-        self.lab, self.role = lab, lab.role
-        displacement, force = lab.kind.channels.position, lab.kind.channels.force
-        self.signals: tuple[str, ...] = (lab.signal(force),)
-        self.inputs = record.signals[lab.signal(displacement)]
-        self.measured, self.present = outputs(record, self.signals)
-        machine = next(item for item in lab.kind.machines(lab.plan) if item.site == "column")
-        self.nuisances = nuisances(lab, machine.parameters)
-        sites = (lab.site("column"), lab.site(f"sensor.{force}"))
-        self.candidates = of_sites(record, sites, lab.plan)
-
-    def predict(self, system: System) -> Array:
-        """Force readings."""
-        return replay.column(system, self.inputs)[:, None]
-
-    def first(self, ticks: int) -> ColumnAlone:
-        """The column over the first ticks."""
-        result: ColumnAlone = cut(self, ticks, self.inputs[:ticks])
-        return result
 
 
 class Building(Measured):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -54,6 +55,7 @@ class Late(NamedTuple):
 
 
 NOT_LATE = Late()
+STEP = 1e-3  # s, about which a command that a logger sampled goes straight
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,6 @@ class Record:
     labs: tuple[RecordedLaboratory, ...] = ()  # the laboratories that it shows, the master's first
     held: float | None = None  # test time (s) of the first hold, before which it ends; None without a hold
     fast: float = 0.0  # rate by which the clock of its readings was fast before they were put right
-    # planned dead times (s) of tables whose commands were taken a tick earlier, by role
-    earlier: Mapping[str, float] = field(default_factory=dict)
     late: Late = NOT_LATE  # by which a logger delays all channels of a kind
     # filters of channels that its import map does not state, by topic and name
     passed: Mapping[tuple[str, str], LoggerFilter] = field(default_factory=dict)
@@ -110,6 +110,17 @@ class Record:
     def static(self) -> bool:
         """Whether its times have no meaning, since only the order of its rows was stated."""
         return is_static(self.run)
+
+    @property
+    def steps(self) -> int:
+        """Steps in which an interval of laboratories by themselves is played, whose commands a logger sampled.
+
+        What stands in one of its rows belongs to one moment, so that a command is reached there. It is 0 in a whole
+        test, or one that rths recorded, where a command is reached at the end of its interval.
+        """
+        if self.stated is None or self.static or self.has("displacement"):
+            return 0
+        return max(1, math.ceil(self.plan.test.interval / STEP - 1e-9))
 
     @cached_property
     def catalogue(self) -> dict[str, Effect]:
@@ -239,7 +250,7 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
         chosen, every = ideal(chosen), ideal(every)
     plans = {MASTER: every} | ({role: chosen} if role != MASTER else {})
     labs = recorded(every, plans)
-    signals, present = on_ticks(run, topics, ticks, labs)
+    signals, present = on_ticks(run, topics, without_rows(run, chosen, ticks), labs)
     if against_ideal:
         commanded(signals, present, labs)
     known = plan is None or (own is not None and own.ground_motion == plan.ground_motion)
@@ -269,14 +280,15 @@ def used_forces(run: Run, plan: Plan, ticks: int) -> Array:
 
 
 def on_ticks(
-    run: Run, topics: list[str], ticks: int, labs: tuple[RecordedLaboratory, ...]
+    run: Run, topics: list[str], missing: Mask, labs: tuple[RecordedLaboratory, ...]
 ) -> tuple[dict[str, Array], dict[str, Mask]]:
-    """The topics' numeric signals on their ticks, and where they are present.
+    """The topics' numeric signals on their ticks, and where they are present; nothing is where `missing` (ticks,) is.
 
     Of a signal that two topics hold the master's is taken, except for signals that the slave wrote and measured itself.
     """
     signals: dict[str, Array] = {}
     present: dict[str, Mask] = {}
+    ticks = missing.size
     there = [lab for lab in labs if lab.role != MASTER]
     own = {name: lab for lab in there for name in (*lab.kind.channels.drives, *lab.kind.channels.names)}
     named = own | {name: lab for lab in there if lab.ahead for name in lab.kind.channels.sent}
@@ -290,7 +302,17 @@ def on_ticks(
             if not np.issubdtype(values.dtype, np.number):
                 continue
             signals[name], present[name] = laid_out(np.asarray(values, dtype=np.float64), places, ticks)
+            present[name] &= ~missing
     return signals, present
+
+
+def without_rows(run: Run, plan: Plan, ticks: int) -> Mask:
+    """The ticks (ticks,) at which an imported recording has no rows, and straight lines in their place."""
+    stated, result = imported(run), np.zeros(ticks, dtype=bool)
+    t = np.arange(ticks) * plan.test.interval
+    for begin, end in stated.gaps if stated else ():
+        result |= (t > begin) & (t < end)
+    return result
 
 
 def commanded(

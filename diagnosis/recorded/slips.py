@@ -16,8 +16,9 @@ import numpy as np
 
 from common.errors import InputError
 from common.recording.imported import imported
+from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.laboratory import RecordedLaboratory
-from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
 from models.registry import Array
 
@@ -107,8 +108,7 @@ def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[ReadingSl
     predicted = part.predict(record.systems[lab.role])
     most = round(LONGEST_LAG / record.plan.test.interval)
     for place, name in enumerate(part.signals):
-        there = part.present[:, place]
-        if not record.has(name) or not there.all():
+        if not record.has(name):
             continue
         factor = compared(part.measured[:, place], predicted[:, place], lab.noise.get(name, 0.0), most)
         if factor is not None and (factor < 0.0 or not 1.0 / FAR < factor < FAR):

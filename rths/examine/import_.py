@@ -100,7 +100,7 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: Tex
         begin, end = max(found.gaps, key=lambda gap: gap[1] - gap[0])
         more = f", and in {len(found.gaps) - 1} shorter gaps" if found.gaps[1:] else ""
         say(
-            f"no rows from {begin:.6g} to {end:.6g} s{more}: straight lines stand there; start and stop leave it out\n"
+            f"no rows from {begin:.6g} to {end:.6g} s{more}: straight lines stand there, which a diagnosis leaves out\n"
         )
     if mapping.plan.roles and not (judged or mapping.static):
         say(f"link: {UNJUDGED}\n")
@@ -134,7 +134,8 @@ def write(path: Path, mapping: ImportMap, found: OnTicks, data: str, *, as_is: b
     recording = Recording(path, plan.test.name, plan.storeys, topics, plan.roles)
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.describe()
-    recording.metadata(IMPORT, ImportedData(data, mapping.static, stated, as_is).metadata())
+    gaps = tuple((begin - found.begin, end - found.begin) for begin, end in found.gaps)
+    recording.metadata(IMPORT, ImportedData(data, mapping.static, stated, as_is, gaps).metadata())
     for topic, rows in columns.items():
         for tick, values in enumerate(zip(*rows.values(), strict=True)):
             at = plan.tick_ns(tick)

@@ -33,6 +33,7 @@ class OnTicks:
     values: dict[str, Array]  # by our name of the signal
     stated: dict[str, ImportedChannel]
     units: dict[str, str]  # taken from the file's row of units, by our name
+    begin: float = 0.0  # s, the time of the first row in the data
     gaps: tuple[tuple[float, float], ...] = ()  # s in the data's own time, between which rows are missing
 
     @property
@@ -51,19 +52,20 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
     theirs, rows = time_base(mapping, table, data)
     interval = mapping.plan.test.interval
     gaps: tuple[tuple[float, float], ...] = ()
+    begin = 0.0
     if mapping.static:
         t = np.arange(theirs.size, dtype=np.float64) * interval
         theirs = t
     else:
         if not as_is:
             refuse_unit(mapping, theirs, data)
-        gaps = missing_rows(theirs)
-        theirs = theirs - theirs[0]
+        gaps, begin = missing_rows(theirs), float(theirs[0])
+        theirs = theirs - begin
         t = np.arange(int(np.floor(theirs[-1] / interval + 1e-9)) + 1, dtype=np.float64) * interval
     between = not stands_on(theirs, t, interval)
     rate = 0.0 if mapping.static or theirs.size < 2 else 1.0 / float(np.median(np.diff(theirs)))
     known = lab_signals(mapping.plan)
-    found = OnTicks(t, {}, {}, {}, gaps)
+    found = OnTicks(t, {}, {}, {}, begin, gaps)
     if mapping.time and not mapping.time_unit and time_unit(mapping, table) not in ("", "s"):
         found.units["time"] = time_unit(mapping, table)
     for name, source in mapping.signals.items():

@@ -10,8 +10,9 @@ from common.plan.plan import Plan
 from common.roles import MASTER
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
+from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.nuisances import Nuisance
-from diagnosis.recorded.parts import ColumnAlone, Measured, Part
+from diagnosis.recorded.parts import Measured, Part
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect
 from loop import replay

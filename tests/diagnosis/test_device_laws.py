@@ -13,7 +13,7 @@ from diagnosis.fits import fitting
 from diagnosis.fits.laws.best import in_best_laws
 from diagnosis.fits.laws.coupled import coupled
 from diagnosis.fits.trade import simplest, under_others
-from diagnosis.recorded.parts import ColumnAlone
+from diagnosis.recorded.column_alone import ColumnAlone
 from laboratories.effects import CATALOGUE
 from models.system import System
 from tests.diagnosis.specimens import INTERVAL, LIMIT, NOISE, TICKS, Driven, K, data_of, swelling

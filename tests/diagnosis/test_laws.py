@@ -21,8 +21,9 @@ from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import alone, simplest
+from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.joined import JoinedPart
-from diagnosis.recorded.parts import ColumnAlone, Part
+from diagnosis.recorded.parts import Part
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect, Parameter
 from models.specimens.fit import SpecimenFit, forces

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from diagnosis.diagnose import put_right
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.laws import loop
 from diagnosis.fits.laws.loop_response import LoopResponse
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
-from diagnosis.recorded.sampled_together import as_planned, factor_as_planned, sampled_together
+from diagnosis.signals.earlier import earlier
 from laboratories.effects import CATALOGUE
 from models.registry import Array
 from tests.diagnosis.cases import Cases, imported, lab_b, white
@@ -99,33 +98,39 @@ def test_no_loop_is_looked_for_where_little_is_left(cases: Cases) -> None:
     assert loop.whole_loops(bare, [bare]) == []
 
 
-def test_a_table_that_was_logged_alone_is_the_same_with_its_commands_a_tick_earlier(cases: Cases) -> None:
-    given = imported(cases.record())
-    alone = replace(
-        given, signals={name: values for name, values in given.signals.items() if name != "displacement"}
-    )
-    moved = sampled_together(alone)
-    assert moved.plan.table.delay == alone.plan.table.delay + alone.plan.test.interval
-    before, after = lab_b(alone), lab_b(moved)
-    read = before.predict(alone.systems[before.role])[:, 0]
-    assert np.allclose(after.predict(moved.systems[after.role])[1:, 0], read[1:], atol=1e-9)
-    assert sampled_together(given) is given
-    assert put_right(alone).plan == moved.plan
+def by_itself(whole: Record) -> Record:
+    """The record as an import of the table alone, with this command and no reading of the damper."""
+    given, command = imported(whole), wanted(TICKS)
+    kept = {name: given.signals[name] for name in ("table_displacement", "table_acceleration")}
+    return replace(given, signals=kept | {"table_command": np.resize(command, given.ticks)})
 
 
-def test_a_dead_time_that_was_found_is_told_as_the_plan_counts_it(cases: Cases) -> None:
-    given = imported(cases.record())
-    kept = ("table_command", "table_displacement", "table_acceleration")
-    moved = sampled_together(replace(given, signals={name: given.signals[name] for name in kept}))
-    part = lab_b(moved)
-    machines = {item.parameter.partition(".")[0] for item in part.nuisances if not item.of_record}
-    assert machines == {"table"}  # of the damper no reading was recorded
-    (delay,) = (item for item in part.nuisances if item.parameter == "table.delay")
-    known = given.plan.tolerances
-    planned_tolerance = known.parameters.get("table.delay", known.default)
-    planned, found = given.plan.table.delay, delay.moved(moved.systems[part.role], 0.7).plan
-    told = as_planned(moved, part.role, found).table.delay
-    assert told == pytest.approx(found.table.delay - given.plan.test.interval, rel=1e-12)
-    assert factor_as_planned(moved, delay, 0.7) == pytest.approx(told / planned, rel=1e-12)
-    assert as_planned(moved, part.role, moved.plans[part.role]).table.delay == planned
-    assert factor_as_planned(moved, delay, 0.7) == pytest.approx(1.0 + 0.7 * planned_tolerance)
+@pytest.mark.parametrize("spectra", [False, True])
+def test_a_table_that_was_logged_alone_follows_a_command_that_bends_between_the_rows(
+    cases: Cases, spectra: bool
+) -> None:
+    alone = by_itself(cases.record())
+    part = lab_b(alone)
+    assert part.steps == 2
+    system = alone.systems[part.role]
+    omega, damping = 2.0 * math.pi * system.plan.table.frequency, system.plan.table.damping_ratio
+    t = np.asarray(np.arange(TICKS.size * FINER) * STEP / FINER, dtype=np.float64)
+    moved = signal.lsim(([omega**2], [1.0, 2.0 * damping * omega, omega**2]), wanted(t), t)[1]
+    truth = np.column_stack([moved, np.gradient(np.gradient(moved, t), t)])[::FINER]
+    late = system.plan.table.delay / STEP
+    truth = np.column_stack([earlier(column, -late) for column in truth.T])[: alone.ticks]
+    inside = slice(100, TICKS.size - 100)
+    if spectra:
+        found = LoopResponse(part, STEP)
+        lines = [found.spectrum(column) for column in part.predict(system)[:, :2].T]
+        replayed = np.stack([np.concatenate([line.real, line.imag]) for line in lines], axis=1)
+        apart = np.linalg.norm(found.predict(system) - replayed, axis=0) / np.linalg.norm(replayed, axis=0)
+        assert np.all(apart < (0.002, 0.08))
+    else:
+        apart = np.std((part.predict(system)[:, :2] - truth)[inside], axis=0) / np.std(truth[inside], axis=0)
+        assert np.all(apart < (2e-5, 3e-4))
+
+
+def test_of_a_damper_without_readings_no_parameter_moves(cases: Cases) -> None:
+    part = lab_b(by_itself(cases.record()))
+    assert {item.parameter.partition(".")[0] for item in part.nuisances if not item.of_record} == {"table"}

@@ -15,7 +15,6 @@ from common.roles import MASTER, name_of
 from diagnosis.findings.for_prediction.spread import spread
 from diagnosis.findings.found import Diagnosis, laid
 from diagnosis.recorded.record import Record
-from diagnosis.recorded.sampled_together import as_planned
 from laboratories.effects.sites import LINK
 from models.system import System
 
@@ -56,7 +55,7 @@ def moved(found: Diagnosis, role: str) -> Plan:
     for verdict in found.verdicts:
         if verdict.search.data.part.role == role:
             system = laid(system, verdict, {})
-    return as_planned(found.record, role, system.plan)
+    return system.plan
 
 
 def changed(planned: Tables, real: Tables, names: tuple[str, ...]) -> Tables:

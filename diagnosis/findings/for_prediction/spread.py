@@ -18,7 +18,6 @@ from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
 from diagnosis.recorded.loop import NOISY, noised
-from diagnosis.recorded.sampled_together import factor_as_planned
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 
@@ -80,11 +79,7 @@ def nominal(found: Diagnosis, fit: Fit) -> Iterator[tuple[int, UncertainParamete
     for place, item in enumerate(part.nuisances):
         if not item.of_record:
             one = UncertainParameter(part.role, item.parameter, storey=item.storey)
-            there, beyond = (
-                factor_as_planned(found.record, item, z)
-                for z in (float(fit.z[place]), float(fit.z[place]) + 1.0)
-            )
-            yield place, one, beyond / there - 1.0
+            yield place, one, item.tolerance / (1.0 + item.tolerance * float(fit.z[place]))
 
 
 def of_effects(

@@ -36,7 +36,10 @@ class LoopResponse(Measured):
         places = [place for place, name in enumerate(names) if name in READ and shown[place]]
         self.role, self.nuisances, self.candidates = part.role, part.nuisances, part.candidates
         self.signals = tuple(part.signals[place] for place in places)
-        self._names, self._interval = [names[place] for place in places], interval
+        self._names, self._step = [names[place] for place in places], interval / max(part.steps, 1)
+        self._ahead = (
+            0.0 if part.steps else interval
+        )  # a reading is taken before the command of its tick acts
         ticks = len(part.measured)
         frequencies: Array = np.asarray(np.fft.rfftfreq(ticks, interval), dtype=np.float64)
         self._lines = (frequencies > LOWEST) & (frequencies < min(HIGHEST, AT_TICKS / interval))
@@ -53,9 +56,8 @@ class LoopResponse(Measured):
 
     def predict(self, system: System) -> Array:
         """Spectra of the readings."""
-        before = np.exp(-self._s * self._interval)  # a reading is taken before the command of its tick acts
-        moved = before * transfer.displacement(
-            self._s, self._interval, system.plan.table, system.effects.table
+        moved = np.exp(-self._s * self._ahead) * transfer.displacement(
+            self._s, self._step, system.plan.table, system.effects.table
         )
         columns = []
         for name, command in zip(self._names, self._commands, strict=True):

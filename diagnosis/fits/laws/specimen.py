@@ -9,8 +9,9 @@ import numpy as np
 
 from common.plan.kinds import COLUMN
 from diagnosis.fits.threads import each
+from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.joined import JoinedPart
-from diagnosis.recorded.parts import ColumnAlone, LaboratoryPart, Part
+from diagnosis.recorded.parts import LaboratoryPart, Part
 from laboratories.effects.effect import Effect, Law, Parameter
 from models.registry import Array
 from models.specimens import fit as specimens
