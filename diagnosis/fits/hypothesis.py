@@ -14,8 +14,7 @@ from laboratories.effects.effect import Effect, Parameter
 from models.registry import Array
 from models.system import System
 
-# Most that a nominal parameter is moved: one in a thousand is further off by chance; beyond that it imitates effects.
-TOLERANCES = 3.3
+TOLERANCES = 3.0  # most that a nominal parameter is moved: beyond it the plan is wrong
 STEP, FINE_STEP = 0.4, 2e-3  # tolerances between differences: over the kinks of friction, or exactly
 OF_SIZE = 0.1  # of such a step, in the distance of an effect's parameter from its null value
 # Of such a step, in the logarithm of a parameter: 1 % of its value. An end stop's place decides on all impacts, and

@@ -25,7 +25,7 @@ def bare(*z: float, names: tuple[str, ...] = ()) -> Fit:
 def test_few_clean_laboratories_are_searched_for_effects(count: int) -> None:
     draws = np.random.default_rng(count).standard_normal((4000, count))
     searched = np.mean([worth.strained(bare(*z)) for z in draws])
-    # one parameter beyond 3.2 and all of them beyond the level of one in fifty
+    # beyond what one in fifty exceeds, and of a few parameters what one alone may be off
     assert 0.01 < searched < 0.035
 
 
@@ -34,7 +34,7 @@ def test_all_parameters_may_be_off_as_chance_has_them_or_one_alone(names: tuple[
     assert not worth.strained(bare(*(1.5,) * 7, names=names))
     assert worth.strained(bare(*(1.6,) * 7, names=names))
     assert not worth.strained(bare(3.1, names=names))
-    assert worth.strained(bare(3.3, 0.0, 0.0, 0.0, names=names))
+    assert worth.strained(bare(3.3, names=names))
 
 
 @pytest.mark.parametrize(("z", "warned"), [(2.0, False), (2.9, True)])
