@@ -203,6 +203,16 @@ def later(values: Samples, ticks: float) -> Samples:
     return np.asarray(np.tensordot(weights, columns, axes=1))
 
 
+def logged_alone(run: Run) -> bool:
+    """Whether a logger recorded a laboratory without the test around it, command and reading of a moment in one row.
+
+    A command is reached in its row then, while rths writes one that is reached at the end of its interval.
+    """
+    stated = imported(run)
+    inside = any("displacement" in columns for columns in run.columns.values())
+    return stated is not None and not stated.static and not inside
+
+
 def exchange_known(run: Run) -> bool:
     """Whether a recording tells which message was used when; without numbers or stamps the link cannot be judged."""
     names = {name for columns in run.columns.values() for name in columns}

@@ -23,9 +23,7 @@ LATE = 4e-3  # s
 ALIKE = 5e-4  # s
 UNLIKE = 0.5
 CALIBRATED = 0.01
-EVENLY = 1.0 / math.sqrt(
-    12.0
-)  # standard deviation of what is anywhere between two bounds, over their distance
+EVENLY = 3.0**-0.5  # rms of what is anywhere from zero to a bound, over that bound
 # Standard deviation of the delay of a stated filter. PASSING: an analogue filter's parts are good to some per cent, and
 # a digital one that loses 3 dB at the same frequency, 100 Hz sampled at 500 Hz, delays slow motion by 13 % less.
 # BETWEEN: what readings do between ticks, as after the steps of a command, is known no better.

@@ -15,7 +15,7 @@ from common.errors import InputError
 from common.plan.plan import Plan, ideal
 from common.plan.read import parse
 from common.recording.holds import before, holds
-from common.recording.imported import ImportedData, LoggerFilter, imported
+from common.recording.imported import ImportedData, LoggerFilter, imported, logged_alone
 from common.recording.run import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING
@@ -115,10 +115,9 @@ class Record:
     def steps(self) -> int:
         """Steps in which an interval of laboratories by themselves is played, whose commands a logger sampled.
 
-        What stands in one of its rows belongs to one moment, so that a command is reached there. It is 0 in a whole
-        test, or one that rths recorded, where a command is reached at the end of its interval.
+        It is 0 where a command is reached at the end of its interval.
         """
-        if self.stated is None or self.static or self.has("displacement"):
+        if not logged_alone(self.run):
             return 0
         return max(1, math.ceil(self.plan.test.interval / STEP - 1e-9))
 

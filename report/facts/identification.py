@@ -11,6 +11,7 @@ import numpy as np
 
 from common.errors import InputError
 from common.plan.plan import Plan
+from common.recording.imported import logged_alone
 from common.recording.run import Run
 from common.roles import kind_of, name_of
 from laboratories.device import Device
@@ -111,9 +112,9 @@ def of_actuator(run: Run, interval: float) -> dict[str, Any]:
     Where the plan's actuator is servo-hydraulic they are those of the lag that comes nearest to it, as `model` says.
     """
     columns = run.columns[topic_of(run, "actuator")]
-    command, measured = columns["actuator_command"], columns["column_displacement"]
-    plan = plan_of(run)
+    plan, measured = plan_of(run), columns["column_displacement"]
     held = plan is not None and plan.actuator.command == "held"
+    command = columns["actuator_command"] if held else written(run, columns["actuator_command"])
     fit = actuator.least_squares(command, measured, interval, held=held)
     result: dict[str, Any] = {"parameters": plain(fit.parameters), "nrmse": fit.nrmse}
     if plan is not None and plan.actuator.model == "servo_hydraulic":
@@ -128,6 +129,11 @@ def of_actuator(run: Run, interval: float) -> dict[str, Any]:
     return result
 
 
+def written(run: Run, command: Array) -> Array:
+    """A command (ticks,) at the ticks before those where it is reached, as the models take it."""
+    return np.append(command[1:], command[-1]) if logged_alone(run) else command
+
+
 def step_ticks(command: Array, segment: ProgrammeSegment) -> list[int]:
     """Ticks at which the command of a segment jumps; it is written one tick ahead of the target."""
     jumps = np.diff(command[segment.begin - 2 : segment.end])
@@ -138,7 +144,7 @@ def step_ticks(command: Array, segment: ProgrammeSegment) -> list[int]:
 def of_table(run: Run, interval: float) -> dict[str, Any]:
     """Frequency, damping ratio and dead time; bandwidth where the motion covers it."""
     columns = run.columns[topic_of(run, "table")]
-    command, measured = columns["table_command"], columns["table_displacement"]
+    command, measured = written(run, columns["table_command"]), columns["table_displacement"]
     fit = table.least_squares(command, measured, interval)
     result: dict[str, Any] = {"parameters": plain(fit.parameters), "nrmse": fit.nrmse}
     sweeps = [segment for segment in segments(run) if segment.name == "sweep"]

@@ -37,9 +37,8 @@ class LoopResponse(Measured):
         self.role, self.nuisances, self.candidates = part.role, part.nuisances, part.candidates
         self.signals = tuple(part.signals[place] for place in places)
         self._names, self._step = [names[place] for place in places], interval / max(part.steps, 1)
-        self._ahead = (
-            0.0 if part.steps else interval
-        )  # a reading is taken before the command of its tick acts
+        # a reading is taken before the command of its tick acts, but where a logger sampled both
+        self._ahead = 0.0 if part.steps else interval
         ticks = len(part.measured)
         frequencies: Array = np.asarray(np.fft.rfftfreq(ticks, interval), dtype=np.float64)
         self._lines = (frequencies > LOWEST) & (frequencies < min(HIGHEST, AT_TICKS / interval))
