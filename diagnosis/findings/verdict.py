@@ -15,12 +15,11 @@ from diagnosis.findings.sites.likely import APART, REST, likely_sites, ranked
 from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit, at_end
-from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, exchanged_pair
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, foresees, gaps, leaves, model_error
-from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN
+from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN, at_bound
 from diagnosis.recorded.nuisances import LoggedReadings
 from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.report.records import Outcome
@@ -47,8 +46,6 @@ STRAINED = 3.0
 NEARLY = 0.99
 # Stand-ins per true name among the verdicts that leave nothing: 5 of 78 were wrong (docs/reference/blind.md).
 FALSE = 0.06
-# Distance from the bound, in tolerances, within which a nominal parameter counts as pinned to it.
-PINNED = 1e-3
 WITHOUT_GAP: tuple[Outcome, ...] = ("none", "tolerances")  # that leave nothing to explain
 UNNAMED: tuple[Outcome, ...] = ("partly", "unknown")  # in which some of the gap has no named cause
 
@@ -337,7 +334,7 @@ def unproven(search: Search) -> bool:
 
 def pinned(fit: Fit) -> tuple[str, ...]:
     """Nominal parameters that a fit leaves at the bound of their range."""
-    far = np.abs(fit.z) > TOLERANCES - PINNED
+    far = at_bound(fit)
     return tuple(item.name for item, yes in zip(fit.data.part.nuisances, far, strict=True) if yes)
 
 

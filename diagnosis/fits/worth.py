@@ -7,13 +7,16 @@ from scipy import special
 
 from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.unexplained import MATERIAL, leaves, remaining
+from diagnosis.signals.mask import Mask
 from models.registry import Array
 
 # The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
 # between effects that are overlooked and effects that are named without a cause.
 DATA_GAIN = 25.0  # 5 standard deviations squared
 PRIOR_GAIN = 10.24  # 3.2 tolerances squared, a little more than one parameter alone may be off
+PINNED = 1e-3  # tolerances from a bound within which a parameter is at it
 BY_CHANCE = 0.02  # of laboratories have nominal parameters that are all further off together
 
 # A further effect explains
@@ -36,8 +39,13 @@ def is_gap(fit: Fit) -> bool:
 
 
 def strained(fit: Fit) -> bool:
-    """Whether nominal parameters have moved too far all together; one alone leaves what it may not explain."""
-    return fit.prior > usual(fit)
+    """Whether nominal parameters have moved too far: all of them together, or one to the bound of its range."""
+    return fit.prior > usual(fit) or bool(np.any(at_bound(fit)))
+
+
+def at_bound(fit: Fit) -> Mask:
+    """Which nominal parameters (nuisances,) a fit leaves at the bound of their range."""
+    return np.asarray(np.abs(fit.z) > TOLERANCES - PINNED)
 
 
 def usual(fit: Fit) -> float:
