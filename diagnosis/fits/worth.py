@@ -15,7 +15,7 @@ from models.registry import Array
 # The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
 # between effects that are overlooked and effects that are named without a cause.
 DATA_GAIN = 25.0  # 5 standard deviations squared
-PRIOR_GAIN = 10.24  # 3.2 tolerances squared, a little more than one parameter alone may be off
+PRIOR_GAIN = 9.0  # three tolerances squared, beyond which no parameter is moved
 PINNED = 1e-3  # tolerances from a bound within which a parameter is at it
 BY_CHANCE = 0.02  # of laboratories have nominal parameters that are all further off together
 
