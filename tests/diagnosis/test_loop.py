@@ -102,7 +102,8 @@ def by_itself(whole: Record) -> Record:
     """The record as an import of the table alone, with this command and no reading of the damper."""
     given, command = imported(whole), wanted(TICKS)
     kept = {name: given.signals[name] for name in ("table_displacement", "table_acceleration")}
-    return replace(given, signals=kept | {"table_command": np.resize(command, given.ticks)})
+    signals = kept | {"table_command": np.resize(command, given.ticks)}
+    return replace(given, signals=signals, run=replace(given.run, columns={}))
 
 
 @pytest.mark.parametrize("spectra", [False, True])

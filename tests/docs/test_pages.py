@@ -46,6 +46,12 @@ UNRUN = {
     "docs/how-to/opensees-server.md": [
         "rths serve two_columns --opensees 127.0.0.1:8090 --opensees 127.0.0.1:8091 --intervals 2"
     ],
+    "docs/how-to/own-data.md": [
+        "rths import cycles.csv --map column_map.toml -o cycles.mcap",
+        "rths import earthquake.csv --map column_map.toml -o earthquake.mcap",
+        "rths diagnose cycles.mcap",
+        "rths diagnose cycles.mcap --validate earthquake.mcap",
+    ],
     "docs/how-to/panel.md": [
         "rths panel default --host lab-a.example.net --port 5006",
         "ssh -L 5006:127.0.0.1:5006 lab-a.example.net",
