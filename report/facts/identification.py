@@ -200,7 +200,7 @@ def of_device(run: Run, plan: Plan, role: str, kind: Device) -> dict[str, Any] |
     )
     if columns is None:
         return None
-    commands = np.ascontiguousarray(columns[channels.command.name])
+    commands = np.ascontiguousarray(written(run, columns[channels.command.name]))
     efforts = columns[channels.effort.name] if channels.effort else np.zeros(commands.size)
     measured = np.column_stack([columns[name] for name in channels.names])
     fit = device.least_squares(kind, plan, commands, np.ascontiguousarray(efforts), measured)
