@@ -33,7 +33,7 @@ from diagnosis.signals import pieces
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
 from laboratories.kind import Machine
-from laboratories.kinds import kind_of
+from laboratories.kinds import KINDS, kind_of
 from loop import replay
 from models.registry import Array
 from models.system import System
@@ -148,7 +148,8 @@ class LaboratoryPart:
         names = tuple(name for machine in seen for name in machine.parameters)
         self.channels = channels(record.stated, lab)
         self.free = nothing_stated(record.mapped, lab)
-        self.steps = record.steps
+        self.known = lab.kind.name in KINDS  # a kind of a user's own has steps of its own within an interval
+        self.steps = record.steps if self.known else min(record.steps, 1)
         self._interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)
@@ -238,7 +239,7 @@ class LaboratoryPart:
         if known is not None:
             return known
         found = self.stepped(system, drive, self.steps)
-        if self.steps:
+        if self.steps and self.known:
             found = found + self.bends(drive)
         self.played = (*self.played, (system, found))[-max(1, min(PLAYED, NUMBERS // found.size)) :]
         return found
