@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from common.plan.kinds import COLUMN
 from common.plan.plan import Plan
 from common.recording.imported import ImportedData
 from common.roles import MASTER
@@ -112,6 +113,11 @@ def of_sites(record: Record, sites: Collection[str], plan: Plan) -> tuple[Effect
     return tuple(one for one in found if not one.in_samples and not (one.timed and record.static))
 
 
+def held(lab: RecordedLaboratory) -> bool:
+    """Whether a laboratory's transfer system holds its command from the tick on, by its plan."""
+    return lab.kind.name == COLUMN and lab.plan.actuator.command == "held"
+
+
 class Measured:
     """What parts have in common whose readings stand for themselves."""
 
@@ -149,7 +155,7 @@ class LaboratoryPart:
         self.channels = channels(record.stated, lab)
         self.free = nothing_stated(record.mapped, lab)
         self.known = lab.kind.name in KINDS  # a kind of a user's own has steps of its own within an interval
-        self.steps = record.steps if self.known else min(record.steps, 1)
+        self.steps = 0 if held(lab) else record.steps if self.known else min(record.steps, 1)
         self._interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)

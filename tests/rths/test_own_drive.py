@@ -13,6 +13,7 @@ from common.recording.imported import imported
 from common.recording.reader import read
 from diagnosis.recorded import record
 from diagnosis.recorded.divided import parts_of
+from diagnosis.recorded.parts import LaboratoryPart
 from models.registry import Array
 
 PLAN = """[test]
@@ -53,8 +54,11 @@ def held(seconds: float, step: float = 1e-3) -> tuple[Array, Array, Array]:
 def bring(call: Any, tmp_path: Path) -> Any:
     """Import rows of the drive at an interval (s) of the plan; the recording's path."""
 
-    def brought(interval: float, rows: Any, more: str = "") -> Path:
-        (tmp_path / "drive.toml").write_text(PLAN.format(interval=interval))
+    def brought(interval: float, rows: Any, more: str = "", command: str = "ramp") -> Path:
+        plan = PLAN.format(interval=interval).replace(
+            "[compensator]", f'command = "{command}"\n[compensator]'
+        )
+        (tmp_path / "drive.toml").write_text(plan)
         (tmp_path / "map.toml").write_text(MAP.format(more=more))
         table = np.column_stack(held(12.0))[rows]
         np.savetxt(tmp_path / "a.csv", table, "%.6f", ",", header="t,u,y", comments="")
@@ -95,10 +99,22 @@ def test_what_a_drive_did_while_rows_are_missing_is_left_out(bring: Any, call: A
     assert stated is not None
     (gap,) = stated.gaps
     assert gap == pytest.approx((4.999, 5.401))
-    (part,) = (one for one in parts_of(record.build(run, role="master")) if one.name == "laboratory A")
+    (part,) = (one for one in parts_of(record.build(run, role="master")) if isinstance(one, LaboratoryPart))
     missing = ~part.present[:, part.signals.index("column_displacement")]
     first, last = np.flatnonzero(missing)[[0, -1]]
     assert first == 5000
     assert 3.0 * LAG < 1e-3 * last - 5.4 < 15.0 * LAG  # a lag remembers e⁻⁷ after seven of its time constants
     assert missing[first : last + 1].all()
     assert diagnosed(call, path, capsys).startswith(("NO GAP", "WITHIN TOLERANCES"))
+
+
+@pytest.mark.parametrize(("command", "steps"), [("ramp", 1), ("held", 0)])
+def test_a_drive_that_holds_its_command_by_its_plan_is_replayed_so(
+    bring: Any, command: str, steps: int
+) -> None:
+    whole = record.build(read(bring(1e-3, slice(None), command=command)), role="master")
+    (part,) = (one for one in parts_of(whole) if isinstance(one, LaboratoryPart))
+    assert part.steps == steps
+    place = part.signals.index("column_displacement")
+    missed = part.measured[:, place] - part.predict(whole.systems["master"])[:, place]
+    assert bool(np.std(missed) < 1.05 * 5e-6) is (command == "held")
