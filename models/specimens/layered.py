@@ -98,11 +98,12 @@ NEAR, FAR = (
 )  # of the balance over the bars' yield force, from where on one more step ends at it; of a strain
 
 # Places in the state: δ (m) and f (N) of the last call, ε₀ and φ; of the layers of either side the farthest compression
-# and its stress; of the layers of bars their memories; z of the friction (m); then room for a step.
+# and its stress; of the layers of bars their memories; z of the friction (m); then room for a step, and the sums of the
+# section at the last balance.
 DEFORMATION, FORCE, STRAIN, CURVATURE, FARTHEST, STRESS, STEEL = 0, 1, 2, 3, 4, 4 + 2 * HALF, 4 + 4 * HALF
 MEMORY = menegotto_pinto.STATE_SIZE
 SLIDER = STEEL + 3 * MEMORY
-BARS = SLIDER + 1  # and room for the parameters of the bars, for a branch that is looked at, and for sums
+BARS = SLIDER + 1  # room for the parameters of the bars, and for a branch that is looked at
 SPARE = BARS + len(menegotto_pinto.MenegottoPintoParams._fields)
 SUMS = SPARE + MEMORY
 STATE_SIZE = SUMS + 5
@@ -184,13 +185,15 @@ def at_rest(p: Array) -> tuple[float, float]:
 def balanced(p: Array, s: Array, along: float, stiff: float) -> None:
     """Move ε₀ and φ of the state to where axial force and moment are in balance.
 
-    The shaft has the moment `along` − `stiff`·φ. By Newton's method, in steps that are limited.
+    The shaft has the moment `along` − `stiff`·φ. By Newton's method, in limited steps, of which the first has the
+    stiffness of the last balance.
     """
     sums = s[SUMS:]
-    for tried in range(ROUNDS):
+    if sums[2] == 0.0:  # no section is without stiffness, so that this one has not moved yet
         section(p, s, s[STRAIN], s[CURVATURE])
+    for tried in range(ROUNDS):
         force, moment = sums[0] + p[AXIAL], sums[1] + stiff * s[CURVATURE] - along
-        near = abs(force) < NEAR and abs(moment) < NEAR
+        near = tried > 0 and abs(force) < NEAR and abs(moment) < NEAR
         axial, coupled, bending = max(sums[2], SLOPE), sums[3], sums[4] + stiff
         whole = axial * bending - coupled * coupled
         strain = (coupled * moment - bending * force) / whole
@@ -200,7 +203,9 @@ def balanced(p: Array, s: Array, along: float, stiff: float) -> None:
         s[STRAIN] += shorter * strain
         s[CURVATURE] += shorter * curvature
         if near:
+            sums[0], sums[1] = -p[AXIAL], along - stiff * s[CURVATURE]
             return
+        section(p, s, s[STRAIN], s[CURVATURE])
 
 
 @jit

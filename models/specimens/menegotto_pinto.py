@@ -73,12 +73,16 @@ def turn(p: Array, s: Array, way: float) -> None:
 
 
 @jit
-def bent(share: float, sharpness: float) -> float:
-    """`δ*/(1 + |δ*|^R)^(1/R)`, without a power that could overflow."""
+def bent(share: float, sharpness: float) -> tuple[float, float]:
+    """`δ*/(1 + |δ*|^R)^(1/R)` and its derivative, without a power that could overflow."""
     size = abs(share)
     if size <= 1.0:
-        return share / (1.0 + size**sharpness) ** (1.0 / sharpness)
-    return float(np.copysign((1.0 + size ** (-sharpness)) ** (-1.0 / sharpness), share))
+        power = size**sharpness
+        divisor = (1.0 + power) ** (1.0 / sharpness)
+        return share / divisor, 1.0 / (divisor * (1.0 + power))
+    power = size ** (-sharpness)
+    curved = (1.0 + power) ** (-1.0 / sharpness)
+    return float(np.copysign(curved, share)), curved * power / (size * (1.0 + power))
 
 
 @jit
@@ -89,10 +93,9 @@ def on_branch(p: Array, s: Array, deformation: float) -> tuple[float, float]:
         slope = p[HARDENING] * p[STIFFNESS]
         return s[START_FORCE] + slope * (deformation - s[START]), slope
     share = (deformation - s[START]) / length
-    curved = bent(share, s[BENT])
+    curved, steep = bent(share, s[BENT])
     height = s[AIM_FORCE] - s[START_FORCE]
     force = s[START_FORCE] + (p[HARDENING] * share + (1.0 - p[HARDENING]) * curved) * height
-    steep = (curved / share) ** (1.0 + s[BENT]) if share != 0.0 else 1.0
     return force, (p[HARDENING] + (1.0 - p[HARDENING]) * steep) * height / length
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from common.errors import InputError
 from models.registry import Array
 from models.specimens import SPECIMENS
+from models.specimens import fit as fitting
 from models.specimens.fit import FREE, fit, forces, thinned
 
 CURVES = Path(__file__).parents[2] / "data" / "fiber_column"
@@ -208,6 +211,22 @@ def test_a_start_with_another_sum_of_beta_and_gamma_gives_the_same_loop() -> Non
     )
     found = fit("bouc_wen", path, forces("bouc_wen", one, path), scaled)
     assert found.parameters["yield_displacement"] == pytest.approx(DY, rel=1e-3)
+
+
+def test_of_few_starts_one_is_followed_to_its_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps: list[int] = []
+
+    def counted(*args: Any, max_nfev: int, **options: Any) -> Any:
+        steps.append(max_nfev)
+        return least_squares(*args, max_nfev=max_nfev, **options)
+
+    monkeypatch.setattr(fitting, "least_squares", counted)
+    starts = [np.array([start]) for start in (-2.0, 0.0, 2.0)]
+    best = fitting.followed(
+        lambda x: np.array([x[0] ** 2 - 1.0, 0.1 * (x[0] - 1.0)]), starts, np.array([-9.0]), np.array([9.0])
+    )
+    assert best.x == pytest.approx([1.0])
+    assert steps.count(fitting.EVALUATIONS) == 1
 
 
 def test_a_long_record_is_thinned_but_keeps_its_peaks() -> None:

@@ -1,4 +1,4 @@
-"""What a section of layers has beside its balance: a core that crushes, friction of cracks, and a constant force."""
+"""A section of layers: its balance, and beside it a core that crushes, friction of cracks, and a constant force."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from models import specimens
 from models.registry import Array
-from models.specimens import layered
+from models.specimens import layered, menegotto_pinto
 from models.specimens.fit import forces
 
 K, DY = 1e7, 0.01  # N/m, m
@@ -50,3 +51,25 @@ def test_a_core_with_few_hoops_loses_strength_from_cycle_to_cycle() -> None:
     assert held.size == crushed.size == 3
     assert held[2] > 0.98 * held[1]
     assert np.all(crushed[1:] < 0.92 * crushed[:-1])
+
+
+def test_every_row_ends_in_balance() -> None:
+    kind, p, s = specimens.pack("layered", **SECTION)
+    bars = p[layered.AXIAL]
+    for x in through(3.0, -3.0, 1.0)[1:]:
+        specimens.step(kind, p, s, x)
+        again = s.copy()
+        layered.section(p, again, again[layered.STRAIN], again[layered.CURVATURE])
+        force, moment = again[layered.SUMS : layered.SUMS + 2]
+        assert abs(force + bars) < 1e-9
+        assert abs(moment - s[layered.SUMS + 1]) < 1e-9
+
+
+def test_the_stiffness_of_bars_is_the_slope_of_their_force() -> None:
+    p = np.array([1.0, 1.0, 0.01, 18.0, 0.925, 0.15, 0.0])
+    s, spare = np.zeros((2, menegotto_pinto.STATE_SIZE))
+    for x in (0.5, 4.0, 3.9):
+        menegotto_pinto.step(p, s, x)
+    for x in np.linspace(3.8, -4.0, 40):
+        after, before = (menegotto_pinto.looked_at(p, s, x + way, spare)[0] for way in (1e-6, -1e-6))
+        assert np.isclose(menegotto_pinto.looked_at(p, s, x, spare)[1], (after - before) / 2e-6, atol=1e-7)
