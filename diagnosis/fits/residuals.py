@@ -67,6 +67,7 @@ class Data:
     # (groups, signals) times the noise that an averaged sample behind an impact is known to; None where none is
     vague: Array | None = None
     erring: float = MODEL_ERROR  # share of a reading's rms that a good solution of the model may err by
+    static: bool = False  # whether its rows have no times
 
     @cached_property
     def _systems(self) -> dict[bytes, System]:
@@ -253,6 +254,7 @@ def prepare(part: Part, record: Record, steps: Mapping[str, float] | None = None
     rounded = np.array([(steps or {}).get(name, 0.0) for name in part.signals])
     planned = np.array([record.planned_noise.get(name, 0.0) for name in part.signals])
     data = Data(part, system, ones, 0.0 * ones, group, train, rounded, record.catalogue, planned=planned)
+    data = replace(data, static=record.static)
     return measured_by(data, 0.0 * ones if part.exact else data.white_part(data.residual(system)))
 
 

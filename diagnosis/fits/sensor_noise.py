@@ -2,6 +2,9 @@
 
 What depends on the part's inputs is no noise. So a flexible model takes it away first, each stretch of time without a
 look at it; what is left at rest, or else where the part moves least, is the noise of the sensors.
+
+A reading of static data settles before the next row, so that its noise is independent from row to row. What changes
+slowly from row to row is the error of a law along the path, unless rows at rest have it too.
 """
 
 from __future__ import annotations
@@ -92,15 +95,14 @@ def remainder(data: Data, system: System) -> Remainder:
     there = part.present & np.isfinite(raw)
     spiky, lines = np.zeros_like(there), np.zeros_like(raw)
     found: list[tuple[pickup.Pickup, ...]] = [()] * raw.shape[1]
-    seen = there.mean(axis=0) >= 0.5
     for place in range(raw.shape[1]):
-        if not seen[place]:
+        if there[:, place].mean() < 0.5:
             raw[:, place] = 0.0
             continue
         whole = residuals.filled(raw[:, place], there[:, place])
         spiky[:, place] = spikes(whole) & there[:, place]
         raw[:, place] = residuals.filled(whole, ~spiky[:, place])
-    for number, span in enumerate(spans(part)):
+    for number, span in enumerate([] if data.static else spans(part)):  # rows have no frequencies
         lines[span], picked, kept = picked_up(raw[span], interval)
         raw[span] -= lines[span] + kept
         found = picked if number == 0 else found
@@ -316,7 +318,8 @@ def model(data: Data, rest: Remainder, part: QuietPart, place: int) -> NoiseMode
     heard = float(rest.single[:, place][np.repeat(quiet, data.group)].std())
     # steps that no noise hides count by themselves, and more than noise of their size
     stepping = resolution > residuals.STEPPING * max(flat, heard)
-    if stepping or not segments or not np.any(rest.noise[:, place]):
+    smooth = data.static and source != "at rest"  # what changes slowly is the error of a law
+    if stepping or smooth or not segments or not np.any(rest.noise[:, place]):
         return NoiseModel(flat, lines=lines, resolution=resolution)
     if alike(rest.noise[:, place], quiet):
         quiet, source, steady = np.ones_like(quiet), "residual", part.varied > VARIED
