@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from diagnosis.findings.sensors.leak import leaks
 from diagnosis.findings.sensors.one_motion import one_motion, one_place
 from diagnosis.findings.sensors.own_reading import errors, gives_energy, machine_alone, of_column
 from diagnosis.findings.sensors.slow_noise import under_less_noise
@@ -55,9 +56,7 @@ class OwnError(NamedTuple):
 
     signal: str
     ratio: float  # its rms over that of the noise
-    sites: tuple[
-        str, ...
-    ] = ()  # from which it may come, the likeliest first; none where the readings must tell
+    sites: tuple[str, ...] = ()  # from which it may come, the likeliest first; none where readings must tell
     text: str = ""  # a sentence on it, empty where another warning says it
 
 
@@ -122,11 +121,11 @@ def other_cause(search: Search) -> bool:
     It is another part of a loop of which several values are named, another law of a specimen of which several effects
     are named, another place of a machine in the place of offsets, or another law of a machine of which a reading is
     named as well that shows nothing else: both are one function of the same motion, as are a column that gives energy
-    and a load cell with hysteresis. A small gap may have any cause.
+    and a load cell with hysteresis, or a dashpot and a charge that leaks. A small gap may have any cause.
     """
     fit = search.chosen
     machine = loop_of_several(search) or specimen_of_several(search) or one_place(search)
-    return bool(machine or errors(fit) or gives_energy(fit) or small(search))
+    return bool(machine or errors(fit) or gives_energy(fit) or leaks(fit) or small(search))
 
 
 def loop_of_several(search: Search) -> str:
@@ -224,12 +223,23 @@ def how_well(search: Search) -> Outcome:
     An effect that only imitates the true one leaves a systematic residual, however much of the gap it closes, or the
     nominal parameters have to give way, or it would be larger than it can be.
     """
+    if not (falls_short(search) or swings(search)):
+        return "explained"
+    return "partly" if search.explained > HALF else "unknown"
+
+
+def falls_short(search: Search) -> bool:
+    """Whether effects leave more than noise, strain nominal parameters or explain too small a gap."""
     fit = search.chosen
     strained = bool(pinned(fit)) or farthest(fit) < HALF or bool(at_end(fit))
     everywhere = fitting.at(replace(fit.data, vague=None), fit.values, fit.z)  # behind impacts as well
-    if not (strained or leaves(everywhere, allowed(search)) or unproven(search) or small(search)):
-        return "explained"
-    return "partly" if search.explained > HALF else "unknown"
+    return strained or leaves(everywhere, allowed(search)) or unproven(search) or small(search)
+
+
+def swings(search: Search) -> bool:
+    """Whether effects leave a resonance that the inputs swing: another mechanism, as no law leaves one."""
+    related, fit = search.data.related, search.chosen
+    return related is not None and related.swings and foresees(fit, model_error(fit))
 
 
 def small(search: Search) -> bool:

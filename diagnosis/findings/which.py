@@ -11,8 +11,16 @@ import numpy as np
 from diagnosis.findings.certainty import trust
 from diagnosis.findings.certainty.intervals import Interval, intervals
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.sensors.leak import cell, leaks
 from diagnosis.findings.sensors.own_reading import errors, gives_energy
-from diagnosis.findings.verdict import EITHER, PartVerdict, loop_of_several, small, specimen_of_several
+from diagnosis.findings.verdict import (
+    EITHER,
+    PartVerdict,
+    loop_of_several,
+    small,
+    specimen_of_several,
+    swings,
+)
 from diagnosis.fits.fitting import Fit, without_rest
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps
@@ -82,6 +90,8 @@ def trusted(
         trust.of_the_plan(item)
         or without_rest(item.search.chosen)
         or small(item.search)
+        or swings(item.searched)
+        or leaks(item.search.chosen)
         or item.own is not None
         for item in left
     )
@@ -136,6 +146,16 @@ def other_causes(verdict: PartVerdict) -> list[str]:
         sentences.append(
             f"With {name} the column gives more energy than it ever took, since its force falls later than it rises. "
             "Hysteresis of its load cell looks the same: these signals cannot tell them apart."
+        )
+    if name := leaks(fit):
+        sentences.append(
+            f"A leak of the charge of {cell(fit)} turns the phase of the force as {name} does: these signals cannot "
+            "tell them apart."
+        )
+    if swings(verdict.searched):
+        sentences.append(
+            f"Beside {described(fit)} something swings for many periods at a frequency of its own. It looks like "
+            "noise, but follows from what the machine was told. It may be another effect, or all of the gap."
         )
     loop, specimen = loop_of_several(verdict.search), specimen_of_several(verdict.search)
     if loop:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import signal
 
-from diagnosis.findings.verdict import judge
+from diagnosis.findings.verdict import judge, swings
+from diagnosis.findings.which import other_causes, trusted
 from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
@@ -18,27 +20,29 @@ from diagnosis.recorded.record import Record
 from diagnosis.signals.predictors.ceiling import Crosswise
 from diagnosis.signals.predictors.resonances import Resonances
 from models.registry import Array
-from tests.diagnosis.cases import Cases, lab_a, lab_b
+from tests.diagnosis.cases import Cases, lab_a, lab_b, white
 
 INTERVAL = 0.008  # s, of averaged samples
 FREQUENCY, DAMPING, MASS = 5.3, 0.012, 40.0  # Hz, ratio and kg of a part that is bolted to the piston
+SIGNS = {"clear": 6.0, "names": 0.0}  # of a verdict whose name stands out of what is left
+LOUD = 300.0  # N rms, of a load cell
 FORCE, PLACE = 1, 0  # places of the column's force and its displacement among the readings
 
 
-def swung(acceleration: Array, interval: float) -> Array:
+def swung(acceleration: Array, interval: float, mass: float = MASS) -> Array:
     """Force (n,) N of a part that swings on something that moves by an acceleration (n,) m/s²."""
     omega = 2.0 * math.pi * FREQUENCY
     spring = [2.0 * DAMPING * omega, omega**2]
     pole = signal.cont2discrete((spring, [1.0, *spring]), interval)
-    return np.asarray(MASS * signal.lfilter(np.ravel(pole[0]), pole[1], acceleration))
+    return np.asarray(mass * signal.lfilter(np.ravel(pole[0]), pole[1], acceleration))
 
 
-def with_a_fixture(whole: Record) -> LaboratoryPart:
+def with_a_fixture(whole: Record, mass: float = MASS) -> LaboratoryPart:
     """The master's laboratory with a part that swings on the piston, whose force the load cell reads."""
     part, interval = lab_a(whole), whole.plan.test.interval
     place = part.predict(whole.systems[part.role])[:, PLACE]
     measured = part.measured.copy()
-    measured[:, FORCE] += swung(np.gradient(np.gradient(place, interval), interval), interval)
+    measured[:, FORCE] += swung(np.gradient(np.gradient(place, interval), interval), interval, mass)
     return part.replaced(measured=measured)
 
 
@@ -105,3 +109,24 @@ def test_a_mass_that_swings_on_the_table_is_named_where_it_looked_like_noise(cas
     whole = cases.record(swings, duration=12.0)
     verdict = judge(search(residuals.prepare(lab_b(whole), whole), Scales(whole)))
     assert verdict.effects == ("table.second_mass",)
+
+
+def test_what_swings_beside_a_name_leaves_that_partly_explained(cases: Cases) -> None:
+    whole = cases.record({"column.inertia": {"mass": 5000.0}}, duration=12.0)
+    part = with_a_fixture(whole, 300.0)
+    part.measured[:, FORCE] += LOUD * white(5, len(part.measured))  # in which it looks like noise of a colour
+    found = search(residuals.prepare(part, whole), Scales(whole))
+    verdict = judge(found)
+    assert verdict.effects == ("column.inertia",)
+    assert swings(found)
+    assert verdict.outcome == "partly"
+    probability = trusted(SimpleNamespace(verdicts=[verdict]), [verdict], SIGNS, 1.0)  # type: ignore[arg-type]
+    assert probability < 0.5
+    assert "swings for many periods" in other_causes(verdict)[0]
+
+
+def test_a_mass_that_does_not_swing_is_explained(cases: Cases) -> None:
+    whole = cases.record({"column.inertia": {"mass": 5000.0}}, duration=12.0)
+    found = search(residuals.prepare(lab_a(whole), whole), Scales(whole))
+    assert judge(found).outcome == "explained"
+    assert not swings(found)

@@ -101,6 +101,11 @@ class Crosswise:
         """Samples of a series."""
         return len(self._x)
 
+    @property
+    def swings(self) -> bool:
+        """Whether columns stand beside the features: those of a resonance."""
+        return bool(self._beside.size)
+
     def predict(self, y: Array) -> Array:
         """Predictions (n, m) of the columns of y (n, m).
 
@@ -108,7 +113,7 @@ class Crosswise:
         zero.
         """
         said = self._ridge(y)
-        return said + self._plain(y - said) if self._beside.size else said
+        return said + self._plain(y - said) if self.swings else said
 
     def beside(self, columns: Array) -> Crosswise:
         """The same with a few columns (n, k) more, which predict what these features leave, without a penalty."""
