@@ -290,12 +290,14 @@ def misplaced(search: Search) -> bool:
     """Whether a single other site explains more of a gap than the effects named, by the readings that it changes.
 
     An effect changes the readings of its site, so that one that only imitates the cause changes others. It is misplaced
-    as well where it changes the right reading as a machine does, and the gap is a function of what the sensor reads.
+    as well where it changes the right reading as a machine does, and the gap is a function of what the sensor reads;
+    but not an effect of a specimen, whose law is in no list and may be any function of its motion and force.
     """
     sites = {search.data.catalogue[name].site for name in search.chosen.names}
     found = ranked(search.commissioned)
     by_form = set(likely_sites(search.commissioned))
-    sensors_alone = bool(by_form) and all("sensor." in site for site in by_form)
+    specimen = any(site.rpartition(".")[2] == "column" for site in sites)
+    sensors_alone = not specimen and bool(by_form) and all("sensor." in site for site in by_form)
     near = by_form if sensors_alone else {item.site for item in found if item.cost < APART}
     return bool(found) and not sites & near and found[0].left < 1.0 - search.explained
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -216,6 +217,22 @@ def test_a_force_of_the_damper_is_misplaced_where_the_gap_is_a_function_of_the_s
     bare = judged(part, data, truth)
     imitation = {"damper.asymmetry": {"share": 0.1}}
     assert misplaced(Search(data, bare, fitting.fit(data, imitation, bare.z), ()))
+
+
+@pytest.mark.parametrize(("name", "wrong"), [("column.hardening", False), ("actuator.gain", True)])
+def test_an_effect_of_a_specimen_is_not_misplaced_where_the_gap_is_a_function_of_its_force(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch, name: str, wrong: bool
+) -> None:
+    part, data, truth = predicted(cases, lab_a)
+    truth[:, part.signals.index("column_force")] *= 1.3
+    bare = judged(part, data, truth)
+    only, own = (
+        SimpleNamespace(site=site, cost=0.0, left=0.0) for site in ("sensor.column_force", name.split(".")[0])
+    )
+    monkeypatch.setattr("diagnosis.findings.verdict.likely_sites", lambda _: (only.site,))
+    monkeypatch.setattr("diagnosis.findings.verdict.ranked", lambda _: [only, own])
+    values = {name: {"share": 0.01} if name == "column.hardening" else {"factor": 1.01}}
+    assert misplaced(Search(data, bare, fitting.at(data, values, bare.z), ())) is wrong
 
 
 def test_a_building_has_no_likely_sites(cases: Cases) -> None:
