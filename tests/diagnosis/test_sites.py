@@ -226,9 +226,8 @@ def test_an_effect_of_a_specimen_is_not_misplaced_where_the_gap_is_a_function_of
     part, data, truth = predicted(cases, lab_a)
     truth[:, part.signals.index("column_force")] *= 1.3
     bare = judged(part, data, truth)
-    only, own = (
-        SimpleNamespace(site=site, cost=0.0, left=0.0) for site in ("sensor.column_force", name.split(".", maxsplit=1)[0])
-    )
+    places = ("sensor.column_force", name.partition(".")[0])
+    only, own = (SimpleNamespace(site=site, cost=0.0, left=0.0) for site in places)
     monkeypatch.setattr("diagnosis.findings.verdict.likely_sites", lambda _: (only.site,))
     monkeypatch.setattr("diagnosis.findings.verdict.ranked", lambda _: [only, own])
     values = {name: {"share": 0.01} if name == "column.hardening" else {"factor": 1.01}}
