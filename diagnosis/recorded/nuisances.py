@@ -24,6 +24,7 @@ ALIKE = 5e-4  # s
 UNLIKE = 0.5
 CALIBRATED = 0.01
 EVENLY = 3.0**-0.5  # rms of what is anywhere from zero to a bound, over that bound
+HELD = 2e-3  # s, for which a controller holds a command at most, as a rule
 # Standard deviation of the delay of a stated filter. PASSING: an analogue filter's parts are good to some per cent, and
 # a digital one that loses 3 dB at the same frequency, 100 Hz sampled at 500 Hz, delays slow motion by 13 % less.
 # BETWEEN: what readings do between ticks, as after the steps of a command, is known no better.
@@ -169,13 +170,13 @@ def of_logger(
 ) -> tuple[LoggedReadings, ...]:
     """Delays of force readings and of the others by a logger of which nothing is stated, about those found elsewhere.
 
-    `spread` is their standard deviation, s; None for what is usual. A command may be `held` for so long, s.
+    `spread` is their standard deviation, s; None for what is usual. Between rows a command may be `held`, s.
     """
     rows, groups = lab.kind.channels.measured, ((late.force, True), (late.motion, False))
     return tuple(
         LoggedReadings(
             "delay",
-            spread or math.hypot(max(ALIKE, UNLIKE * about), unsure, EVENLY * held),
+            spread or math.hypot(max(ALIKE, UNLIKE * about), unsure, EVENLY * min(held, HELD)),
             lab,
             those,
             about,
@@ -190,7 +191,7 @@ def of_filters(
 ) -> tuple[LoggedReadings, ...]:
     """By how much forces, and other readings, of which a filter is stated are late beyond that and their delay.
 
-    A command may be `held` for so long, s.
+    Between rows a command may be `held`, s.
     """
     result = []
     for force in (True, False):
@@ -198,7 +199,7 @@ def of_filters(
         those = {row.name: one.filter for row, one in rows if one.filter and (row.unit == "N") == force}
         if those:
             late = max(ImportedChannel(one).late for one in those.values())
-            known = math.hypot(PASSING * late, BETWEEN, EVENLY * held)
+            known = math.hypot(PASSING * late, BETWEEN, EVENLY * min(held, HELD))
             result.append(LoggedReadings("delay", known, lab, tuple(those), least=-late))
     return tuple(result)
 

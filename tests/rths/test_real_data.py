@@ -69,7 +69,7 @@ def test_the_force_rigs_extra_delay_agrees_with_the_cross_correlation(
     assert verdict["effects"] == ["actuator.time_constant"]
     factor = verdict["parameters"]["actuator.time_constant"]["factor"]["value"]
     lag = factor * report["tolerances"]["actuator.time_constant"]["factor"] * NOMINAL_LAG
-    assert lag + interval == pytest.approx(seen, abs=3e-3)  # a command is reached one interval later
+    assert lag == pytest.approx(seen, abs=3e-3)
 
 
 @pytest.mark.slow
