@@ -12,12 +12,14 @@ from diagnosis.fits.unexplained import MATERIAL, leaves, remaining
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 
+# Of what chance does to nominal parameters (docs/decisions/0060-rare-parameters.md).
+PRIOR_GAIN = 9.0  # three tolerances squared, beyond which no parameter is moved
+PINNED = 1e-3  # tolerances from a bound within which a parameter is at it
+BY_CHANCE = 0.02  # share of laboratories in which Σ z² of a part is larger by chance
+
 # The figures below were set on draws of `rths blind --set tune` (docs/decisions/0012-diagnosis.md), as a compromise
 # between effects that are overlooked and effects that are named without a cause.
 DATA_GAIN = 25.0  # 5 standard deviations squared
-PRIOR_GAIN = 9.0  # three tolerances squared, beyond which no parameter is moved
-PINNED = 1e-3  # tolerances from a bound within which a parameter is at it
-BY_CHANCE = 0.02  # of laboratories have nominal parameters that are all further off together
 
 # A further effect explains
 REST = 0.85  # this share of what is left,

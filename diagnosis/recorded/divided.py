@@ -7,8 +7,8 @@ import numpy as np
 from common.plan.kinds import COLUMN
 from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.ground import Ground
-from diagnosis.recorded.known import with_known_commands
 from diagnosis.recorded.laboratory import RecordedLaboratory
+from diagnosis.recorded.missing_rows import with_known_commands
 from diagnosis.recorded.parts import Building, LaboratoryPart, Part
 from diagnosis.recorded.record import Record
 

@@ -170,7 +170,8 @@ def of_logger(
 ) -> tuple[LoggedReadings, ...]:
     """Delays of force readings and of the others by a logger of which nothing is stated, about those found elsewhere.
 
-    `spread` is their standard deviation, s; None for what is usual. Between rows a command may be `held`, s.
+    `spread` is their standard deviation, s; None for what is usual. `held` is the longest that a command may be held
+    between rows, s.
     """
     rows, groups = lab.kind.channels.measured, ((late.force, True), (late.motion, False))
     return tuple(
@@ -191,7 +192,7 @@ def of_filters(
 ) -> tuple[LoggedReadings, ...]:
     """By how much forces, and other readings, of which a filter is stated are late beyond that and their delay.
 
-    Between rows a command may be `held`, s.
+    `held` is the longest that a command may be held between rows, s.
     """
     result = []
     for force in (True, False):

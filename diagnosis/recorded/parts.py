@@ -154,8 +154,8 @@ class LaboratoryPart:
         names = tuple(name for machine in seen for name in machine.parameters)
         self.channels = channels(record.stated, lab)
         self.free = nothing_stated(record.mapped, lab)
-        self.known = lab.kind.name in KINDS  # a kind of a user's own has steps of its own within an interval
-        self.steps = 0 if held(lab) else record.steps if self.known else min(record.steps, 1)
+        self.built_in = lab.kind.name in KINDS  # a user's kind has steps of its own within an interval
+        self.steps = 0 if held(lab) else record.steps if self.built_in else min(record.steps, 1)
         self._interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)
@@ -245,7 +245,7 @@ class LaboratoryPart:
         if known is not None:
             return known
         found = self.stepped(system, drive, self.steps)
-        if self.steps and self.known:
+        if self.steps and self.built_in:
             found = found + self.bends(drive)
         self.played = (*self.played, (system, found))[-max(1, min(PLAYED, NUMBERS // found.size)) :]
         return found
