@@ -35,7 +35,6 @@ from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
-from diagnosis.fits.unexplained import remaining
 from diagnosis.learned.learn import learn
 from diagnosis.recorded.divided import BUILDING, driven, parts_of, used
 from diagnosis.recorded.ground import Ground
@@ -186,7 +185,7 @@ def by_itself(verdict: PartVerdict, aside: Collection[str]) -> PartVerdict:
         or swaying.own_error(verdict, part)
         or uneven_noise.own_error(verdict, part, aside)
     )
-    if own is None or (slight and own.ratio < remaining(search.chosen)):
+    if own is None or (slight and own.ratio < search.left):
         return verdict
     return replace(verdict, outcome="unknown", own=own)
 
@@ -282,11 +281,6 @@ def exchanged(record: Record) -> list[LinkFinding]:
         return []
     account = exchange.account(record.run, record.plan.test.interval)
     return link_effects.findings(account, record.plan.test.interval)
-
-
-def said_of(record: Record, more: Sequence[Record]) -> list[str]:
-    """Sentences on what a recording can show, alone or together with `more`."""
-    return [*together(more), *of_plan(record), *not_recorded(record)]
 
 
 def together(more: Sequence[Record]) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 from common.errors import InputError
 from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.verdict import PartVerdict
+from diagnosis.findings.verdict import UNNAMED, WITHOUT_GAP, PartVerdict
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.search import Search
 from diagnosis.fits.unexplained import gaps
@@ -51,7 +51,7 @@ def ceilings(found: Diagnosis) -> tuple[Ceiling, ...]:
     result = []
     for verdict in found.verdicts:
         search = verdict.search
-        if verdict.outcome in ("none", "tolerances") or search.data.part.exact:
+        if verdict.outcome in WITHOUT_GAP or search.data.part.exact:
             continue
         flexible = flexible_share(found, search)
         if flexible is not None:
@@ -86,7 +86,7 @@ def flexible_share(found: Diagnosis, search: Search) -> float | None:
 
 def unknowns(found: Diagnosis) -> tuple[Unknown, ...]:
     """Descriptions of the residuals that no effect of the catalogue explains, the largest over its noise first."""
-    left = [item for item in found.verdicts if item.outcome in ("unknown", "partly")]
+    left = [item for item in found.verdicts if item.outcome in UNNAMED]
     return tuple(described(found, item) for item in sorted(left, key=lambda item: -item.search.left))
 
 

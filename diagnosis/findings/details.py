@@ -115,13 +115,12 @@ def laboratory(lab: RecordedLaboratory) -> LaboratorySeen:
 
 def remains(found: Diagnosis, far: Response) -> Remaining:
     """The gap that the verdict leaves, overall and by site."""
-    left = ((item, remaining(item.search.chosen)) for item in found.verdicts)
     return Remaining(
         overall=far.how_far.after,
         where=tuple(
-            Left(site=where.unexplained(item).site, residual_to_noise=ratio)
-            for item, ratio in left
-            if ratio > 0.0
+            Left(site=where.unexplained(item).site, residual_to_noise=item.search.left)
+            for item in found.verdicts
+            if item.search.left > 0.0
         ),
     )
 

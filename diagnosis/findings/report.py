@@ -14,7 +14,7 @@ from diagnosis.findings.certainty import trust
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.further_tests import exercise, next_test
 from diagnosis.findings.timeless import without_times
-from diagnosis.findings.verdict import PartVerdict
+from diagnosis.findings.verdict import UNNAMED, PartVerdict
 from diagnosis.findings.which import which
 from diagnosis.fits import sensor_noise
 from diagnosis.fits.settling import SMALL
@@ -104,7 +104,7 @@ def status_of(found: Diagnosis) -> Status:
     named = any(verdict.effects for verdict in found.verdicts) or found.readings or found.link
     if "unknown" in outcomes and not named:
         return "unknown_effect"
-    if outcomes & {"unknown", "partly"}:
+    if not outcomes.isdisjoint(UNNAMED):
         return "partly_explained"
     if not named:
         return without_names(found)

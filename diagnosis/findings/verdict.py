@@ -12,7 +12,7 @@ from diagnosis.findings.sensors.leak import leaks
 from diagnosis.findings.sensors.one_motion import one_motion, one_place
 from diagnosis.findings.sensors.own_reading import errors, gives_energy, machine_alone, of_column
 from diagnosis.findings.sensors.slow_noise import under_less_noise
-from diagnosis.findings.sites.likely import APART, REST, likely_sites, ranked
+from diagnosis.findings.sites.likely import APART, TRUE_LEAVES, likely_sites, ranked
 from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.fits import fitting, hypothesis, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit, at_end
@@ -24,6 +24,7 @@ from diagnosis.fits.worth import DATA_GAIN, PRIOR_GAIN, SEEN, at_bound
 from diagnosis.recorded.nuisances import LoggedReadings
 from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.report.records import Outcome
+from laboratories.effects.sites import is_sensor
 from models.registry import Array
 
 # Share of a gap's energy from which on effects that leave something are named: what they explain then is the larger
@@ -45,7 +46,7 @@ OWN = 0.4
 STRAINED = 3.0
 # Share of a gap's energy beyond any that these stand-ins explained.
 NEARLY = 0.99
-# Stand-ins per true name among the verdicts that leave nothing: 5 of 78 were wrong (docs/reference/blind.md).
+# Stand-ins per true name among the verdicts that leave nothing: 5 of 78 were wrong (ADR 0052).
 FALSE = 0.06
 WITHOUT_GAP: tuple[Outcome, ...] = ("none", "tolerances")  # that leave nothing to explain
 UNNAMED: tuple[Outcome, ...] = ("partly", "unknown")  # in which some of the gap has no named cause
@@ -138,13 +139,8 @@ def loop_of_several(search: Search) -> str:
     if part is None:
         return ""
     loop = part.lab.site(part.lab.kind.sites[0])
-    own = [(data.catalogue[name], given) for name, given in search.chosen.values.items()]
-    values = [
-        effect
-        for effect, given in own
-        if effect.site == loop and effect.apply(data.system, **given).effects == data.system.effects
-    ]
-    return loop if len(values) > 1 else ""
+    values = hypothesis.values_of_plan(data, search.chosen.values)
+    return loop if sum(data.catalogue[name].site == loop for name in values) > 1 else ""
 
 
 def specimen_of_several(search: Search) -> str:
@@ -153,10 +149,9 @@ def specimen_of_several(search: Search) -> str:
     Each of its effects is a force that follows from one motion, as is the law of any specimen that the catalogue lacks:
     two of them together imitate it.
     """
-    data, (site, values) = search.data, of_column(search.chosen)
-    laid = [data.catalogue[name].apply(data.system, **given) for name, given in values.items()]
-    laws = any(system.effects != data.system.effects for system in laid)
-    return site if len(laid) > 1 and laws else ""
+    site, values = of_column(search.chosen)
+    laws = len(values) - len(hypothesis.values_of_plan(search.data, values))
+    return site if len(values) > 1 and laws > 0 else ""
 
 
 def odds(search: Search) -> list[float]:
@@ -266,7 +261,7 @@ def artefact(search: Search) -> bool:
     data = search.data
     kinds = {data.catalogue[name].kind for name in search.chosen.names}
     logged = any(isinstance(item, LoggedReadings) for item in data.part.nuisances)
-    return kinds == {"measurement"} and not logged and search.explained < 1.0 - REST
+    return kinds == {"measurement"} and not logged and search.explained < 1.0 - TRUE_LEAVES
 
 
 def trifling(search: Search) -> bool:
@@ -296,8 +291,8 @@ def misplaced(search: Search) -> bool:
     sites = {search.data.catalogue[name].site for name in search.chosen.names}
     found = ranked(search.commissioned)
     by_form = set(likely_sites(search.commissioned))
-    specimen = any(site.rpartition(".")[2] == "column" for site in sites)
-    sensors_alone = not specimen and bool(by_form) and all("sensor." in site for site in by_form)
+    _, specimen = of_column(search.chosen)
+    sensors_alone = not specimen and bool(by_form) and all(map(is_sensor, by_form))
     near = by_form if sensors_alone else {item.site for item in found if item.cost < APART}
     return bool(found) and not sites & near and found[0].left < 1.0 - search.explained
 

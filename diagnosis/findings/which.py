@@ -15,6 +15,7 @@ from diagnosis.findings.sensors.leak import cell, leaks
 from diagnosis.findings.sensors.own_reading import errors, gives_energy
 from diagnosis.findings.verdict import (
     EITHER,
+    UNNAMED,
     PartVerdict,
     loop_of_several,
     small,
@@ -80,7 +81,7 @@ def trusted(
     Where nothing is left, the probability by `costs` is the most. Where something is left, costs only tell the effects
     from the alternatives to them, and the share of the gap that is left lowers the probability.
     """
-    if all(verdict.outcome not in ("partly", "unknown") for verdict in found.verdicts):
+    if all(verdict.outcome not in UNNAMED for verdict in found.verdicts):
         return min(costs, trust.EXPLAINED.probability(signs))
     near = float(np.prod([trust.share_likeliest(verdict) for verdict in named]))
     left = [item for item in named if item.outcome == "partly"]

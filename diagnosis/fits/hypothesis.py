@@ -35,6 +35,19 @@ def lay(data: Data, z: Array, values: Values) -> System:
     return data.logged(system, z)
 
 
+def values_of_plan(data: Data, values: Values) -> list[str]:
+    """The effects that are nothing but another value of a parameter of the plan, as a mass or a delay.
+
+    Such an effect lays no law over the plan's models.
+    """
+    effects = data.system.effects
+    return [
+        name
+        for name, given in values.items()
+        if data.catalogue[name].apply(data.system, **given).effects == effects
+    ]
+
+
 @dataclass(frozen=True)
 class Free:
     """One parameter of an effect that a fit moves, on the scale it is moved on."""

@@ -21,6 +21,11 @@ def sensors(kind: Kind) -> tuple[str, ...]:
     return tuple(f"sensor.{name}" for name in kind.channels.names)
 
 
+def is_sensor(site: str) -> bool:
+    """Whether a site is a sensor, also under the name that it has in a test with several laboratories of a kind."""
+    return "sensor." in site
+
+
 def of_kind(kind: Kind) -> tuple[str, ...]:
     """The sites in a laboratory of a kind, its sensors last."""
     return (*kind.sites, *sensors(kind))

@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.sites.likely import REST
+from diagnosis.findings.sites.likely import TRUE_LEAVES
 from diagnosis.findings.verdict import PartVerdict
-from diagnosis.fits import worth
+from diagnosis.fits import hypothesis, worth
 from diagnosis.fits.laws.best import BETTER
 from diagnosis.fits.trade import freedom
-from diagnosis.fits.unexplained import MATERIAL, remaining
+from diagnosis.fits.unexplained import MATERIAL
 
 LEAST_TRACE = 0.1  # trace over noise below which a smaller one makes no difference: nothing can be seen of it
 SIGNS = ("clear", "names")
@@ -37,14 +37,14 @@ class Weights(NamedTuple):
         return 1.0 / (1.0 + math.exp(-odds))
 
 
-# Learned from 113 verdicts that leave nothing and from 33 that leave something (docs/reference/blind.md).
+# Learned from 113 verdicts that leave nothing and from 33 that leave something (ADR 0052).
 EXPLAINED = Weights(2.93, {"clear": 0.0805, "names": -0.719})
 PARTLY = Weights(-0.569, {"clear": 0.225, "names": -0.113})
 
 
 def share_named(explained: float) -> float:
     """Probability that the effects named are the true ones, by the share of a gap's energy that they explain."""
-    return REST / (REST + max(1.0 - explained, 0.0))
+    return TRUE_LEAVES / (TRUE_LEAVES + max(1.0 - explained, 0.0))
 
 
 def less_by_freedom(probability: float, verdicts: Sequence[PartVerdict]) -> float:
@@ -65,9 +65,8 @@ def of_the_plan(verdict: PartVerdict) -> bool:
     What a mechanism leaves its law may leave, which is another one in the laboratory. A value has no law: what is left
     beside it has another cause.
     """
-    data, fit = verdict.search.data, verdict.search.chosen
-    moved = [data.catalogue[name].apply(data.system, **values) for name, values in fit.values.items()]
-    return all(system.effects == data.system.effects for system in moved)
+    fit = verdict.search.chosen
+    return len(hypothesis.values_of_plan(fit.data, fit.values)) == len(fit.values)
 
 
 def share_likeliest(verdict: PartVerdict) -> float:
@@ -90,7 +89,7 @@ def signs(found: Diagnosis) -> dict[str, float]:
     traces = [smallest_trace(verdict) for verdict in named]
     open_parts = [verdict for verdict in found.verdicts if not verdict.effects]
     compared = [*zip(traces, named, strict=True), *((min(traces, default=1.0), one) for one in open_parts)]
-    clear = [math.log(trace / (remaining(verdict.search.chosen) + MATERIAL)) for trace, verdict in compared]
+    clear = [math.log(trace / (verdict.search.left + MATERIAL)) for trace, verdict in compared]
     return {"clear": min(clear, default=math.log(1.0 / MATERIAL)), "names": count - 1.0}
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis.findings.sites.likely import APART, REST, ranked
+from diagnosis.findings.sites.likely import APART, TRUE_LEAVES, ranked
 from diagnosis.findings.sites.signatures import laboratory_of, signatures
 from diagnosis.fits import hypothesis
 from diagnosis.fits.search import Search
+from laboratories.effects.sites import is_sensor
 
 STILL = np.array([1e-3])  # Hz, at which a machine stands where its constant force or place puts it
 
@@ -20,8 +21,8 @@ def one_motion(search: Search) -> bool:
     effects = [search.data.catalogue[name] for name in search.chosen.names]
     if len({item.site for item in effects}) < 2 or {item.kind for item in effects} != {"measurement"}:
         return False
-    near = [item for item in ranked(search.commissioned) if item.cost < APART and item.left < REST]
-    return any("sensor." not in item.site for item in near) or one_place(search)
+    near = [item for item in ranked(search.commissioned) if item.cost < APART and item.left < TRUE_LEAVES]
+    return any(not is_sensor(item.site) for item in near) or one_place(search)
 
 
 def one_place(search: Search) -> bool:
@@ -38,7 +39,7 @@ def one_place(search: Search) -> bool:
     )
     change = data.part.predict(hypothesis.lay(data, fit.z, fit.values)) - data.part.predict(less)
     apart = np.mean(change, axis=0) / data.sigma
-    machines = [one for one in signatures(part, less, STILL) if "sensor." not in one.site]
+    machines = [one for one in signatures(part, less, STILL) if not is_sensor(one.site)]
     ways = [np.real(one.readings[0]) / data.sigma for one in machines]
     shares = [float(way @ apart) ** 2 / max(float(way @ way), 1e-300) for way in ways]
-    return max(shares, default=0.0) > (1.0 - REST) * float(apart @ apart)
+    return max(shares, default=0.0) > (1.0 - TRUE_LEAVES) * float(apart @ apart)

@@ -8,7 +8,7 @@ import numpy as np
 
 from common.plan.kinds import COLUMN
 from common.recording.imported import NOTHING_STATED
-from diagnosis.findings.sites.likely import REST
+from diagnosis.findings.sites.likely import TRUE_LEAVES
 from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.fits import candidates, hypothesis, worth
 from diagnosis.fits.fitting import Fit, excess
@@ -30,7 +30,7 @@ def machine_alone(search: Search) -> Search:
     fit = search.chosen
     for name in errors(fit):
         less = candidates.without(fit, name)
-        if excess(less) < REST * excess(search.commissioned):
+        if excess(less) < TRUE_LEAVES * excess(search.commissioned):
             fit = less
     if fit is search.chosen:
         return search

@@ -8,12 +8,13 @@ import numpy as np
 
 from diagnosis.findings.sensors.common_noise import in_common
 from diagnosis.findings.sensors.readings import LEAST
-from diagnosis.findings.sites.likely import APART, REST, ranked
+from diagnosis.findings.sites.likely import APART, TRUE_LEAVES, ranked
 from diagnosis.fits import fitting, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, likeliest
 from diagnosis.fits.threads import each
+from laboratories.effects.sites import is_sensor
 
 # Noise of a reading at its loudest frequency over that at the highest ones, from which on it is doubted where no other
 # reading of its laboratory has more than QUIET, or all others have so many times less. Pink noise of a test has less
@@ -57,7 +58,7 @@ def moves(fit: Fit) -> bool:
     """Whether the readings follow from a machine's unknown motion so well that no sensor's error explains as much."""
     found = ranked(fit)
     near = [item.site for item in found if item.cost < APART]
-    return bool(near) and not any("sensor." in site for site in near) and found[0].left < REST
+    return bool(near) and not any(map(is_sensor, near)) and found[0].left < TRUE_LEAVES
 
 
 def lone_noise(fit: Fit) -> str:

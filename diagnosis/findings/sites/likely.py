@@ -18,6 +18,7 @@ from diagnosis.fits import fitting, hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.residuals import Data
+from laboratories.effects.sites import is_sensor
 from models.registry import Array
 
 # Of a residual's rms in a band, by which a signature may err: nominal parameters are known to 2 %, and the phase of a
@@ -29,10 +30,10 @@ APART = 15.0
 SCATTER = 5.0  # the largest of these
 # Nats that speak against a rare cause from the start, so that by the same trial it counts only where a reading differs.
 RARE = 60.0
-# A stand-in rarely explains more than 0.94 of a gap's energy, the true mechanism under another law rarely less: on the
+# Share of a gap's energy that the true mechanism may leave under another law. A stand-in rarely leaves less: on the
 # set "tune" and on effects of no catalogue stand-ins explained 0.59 to 0.93 of it where no nominal parameter was at its
 # bound, true mechanisms 0.95 to 1.00.
-REST = 0.06
+TRUE_LEAVES = 0.06
 NARROWEST, RELATIVE, FEWEST = 0.5, 6.0, 4  # bands: Hz, frequency over width, and lines at least
 END = 1.5  # s, over which the end is faded out, so that a motion that goes on there does not wrap around
 ROUNDS = 3  # in which parameters and the bands' energies are found in turn
@@ -64,7 +65,7 @@ def likely_sites(fit: Fit) -> tuple[str, ...]:
     forces there. At a machine of which an effect is named that is not asked: what is left is its law's.
     """
     near = [item.site for item in ranked(fit) if item.cost < APART]
-    order = sorted(near, key=lambda site: "sensor." in site)
+    order = sorted(near, key=is_sensor)
     part = laboratory_of(fit.data.part)
     if part is None:
         return tuple(order)
@@ -73,7 +74,7 @@ def likely_sites(fit: Fit) -> tuple[str, ...]:
         (sensor, machine): functions.lead(fit, part, sensor, machine)
         for sensor in order
         for machine in order
-        if "sensor." in sensor and "sensor." not in machine and machine not in explained
+        if is_sensor(sensor) and not is_sensor(machine) and machine not in explained
     }
     beaten = {
         machine if nats > 0.0 else sensor for (sensor, machine), nats in leads.items() if abs(nats) > APART

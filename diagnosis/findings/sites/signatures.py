@@ -24,6 +24,7 @@ from common.plan.kinds import COLUMN, TABLE
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.parts import LaboratoryPart, Part
+from laboratories.effects.sites import is_sensor
 from models.registry import Array
 from models.system import System
 
@@ -91,7 +92,7 @@ def alone(part: LaboratoryPart, system: System, name: str) -> tuple[str, ...]:
     machines = [
         site
         for site, row in columns
-        if "sensor." not in site and row[place] != 0.0 and np.count_nonzero(row) == 1
+        if not is_sensor(site) and row[place] != 0.0 and np.count_nonzero(row) == 1
     ]
     return (*machines, part.lab.sensor(name))
 
