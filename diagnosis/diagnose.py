@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -14,9 +15,11 @@ from common.plan.kinds import COLUMN
 from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
 from diagnosis.findings import filters, logger, report, where
+from diagnosis.findings.certainty.other_causes import small
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors import jumps, outliers, readings, staircases, swaying, uneven_noise
 from diagnosis.findings.sensors.loud_noise import no_noise
+from diagnosis.findings.sensors.noise_levels import highest_rms, lines_rms, noise_rms
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.sensors.staircases import Stairs
 from diagnosis.findings.sites.signatures import laboratory_of
@@ -24,12 +27,8 @@ from diagnosis.findings.verdict import (
     UNNAMED,
     WITHOUT_GAP,
     PartVerdict,
-    heard,
     judge,
-    pickup,
     seen_in,
-    sharpest,
-    small,
 )
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
@@ -108,6 +107,15 @@ def among(record: Record, systems: Mapping[str, System]) -> Record:
     return replace(record, whole=replace(record.whole, others=others))
 
 
+class JudgedParts(NamedTuple):
+    """The parts of a recording as they were judged, in the order of the test."""
+
+    datas: list[Data]
+    verdicts: list[PartVerdict]
+    steps: Mapping[str, float]  # from one value of a reading to the next, by signal
+    hidden: Mapping[str, Stairs]  # those of these steps that noise hides
+
+
 def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) -> Diagnosis:
     """Judge every part of a recording, its laboratories in `more` recordings of them as well."""
     refuse_others(record, more)
@@ -120,54 +128,79 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
             f"{' or '.join(name for lab in record.labs for name in lab.commands)} with a reading of that laboratory, "
             "or column_displacement with column_force."
         )
-    further = [part for other in more for part in parts_of(other)]
-    rounded = readings.steps(record)
-    steps = readings.resolutions(record, rounded) | logger.interpolated(parts)
-    datas, verdicts = [], []
-    hidden: dict[str, Stairs] = {}
-    late = None if record.stated is None else record.late
-    for number, given in enumerate(parts, 1):
-        part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
-        tell(part.name, number, len(parts))
-        data, verdict = seen(part, further, record, steps)
-        if anew := staircases.hidden(verdict.search, record):
-            hidden, steps = hidden | anew, steps | {name: stairs.step for name, stairs in anew.items()}
-            data, verdict = seen(part, further, record, steps)
-        datas.append(data)
-        verdicts.append(verdict)
-        late = late and logger.later(late, verdict, record)
-    held = {} if record.static else readings.held(record, steps)  # a curve may stand still where it turns
-    noisy = readings.findings(record, noise(verdicts, sharpest), rounded, steps, logged=late is not None)
-    verdicts, noisy = machines_first(record, verdicts, noisy)
-    loud = noise(verdicts, heard)
-    sensors = [*noisy, *staircases.findings(hidden, record, logged=late is not None)]
+    rounded, logged = readings.steps(record), record.stated is not None
+    found = judge_parts(record, parts, [part for other in more for part in parts_of(other)], rounded, tell)
+    held = (
+        {} if record.static else readings.held(record, found.steps)
+    )  # a curve may stand still where it turns
+    noisy = readings.findings(
+        record, rms_by_signal(found.verdicts, highest_rms), rounded, found.steps, logged=logged
+    )
+    verdicts, noisy = machines_first(record, found.verdicts, noisy)
+    loud = rms_by_signal(verdicts, noise_rms)
+    sensors = [*noisy, *staircases.findings(found.hidden, record, logged=logged)]
     aside = {*held, *(record.catalogue[item.effect].signal for item in sensors), *logger.blurred(verdicts)}
-    verdicts = [by_itself(verdict, aside) for verdict in verdicts]
+    verdicts = [with_own_error(verdict, aside) for verdict in verdicts]
     result = Diagnosis(
         record,
         verdicts,
         sensors,
         exchanged(record),
-        {} if late is not None else held,  # a logger's steps repeat samples too
-        readings.floors(loud, steps, sensors, record),
-        noise(verdicts, pickup),
-        [
-            *together(more),
-            *of_plan(record),
-            *not_recorded(record),
-            *reversed_signs(datas),
-            *repeating(held),
-            *outliers.told(verdicts),
-            *(verdict.own.text for verdict in verdicts if verdict.own is not None and verdict.own.text),
-            *doubted(verdicts),
-            *where.undecided(verdicts),
-        ],
+        {} if logged else held,  # a logger's steps repeat samples too
+        readings.floors(loud, found.steps, sensors, record),
+        rms_by_signal(verdicts, lines_rms),
+        remarks(record, more, found.datas, verdicts, held),
         [law for verdict in verdicts if learnable(verdict) for law in learn(verdict.search.chosen)],
     )
     return replace(result, warnings=[*result.warnings, *logger.remarks(result)])
 
 
-def by_itself(verdict: PartVerdict, aside: Collection[str]) -> PartVerdict:
+def judge_parts(
+    record: Record, parts: Sequence[Part], further: Sequence[Part], rounded: Mapping[str, float], tell: Tell
+) -> JudgedParts:
+    """Judge each part, with the same part of other recordings among `further`.
+
+    A part that tells the delay of a data logger is judged before those that are judged behind that delay. One whose
+    verdict shows steps of a reading that noise hides, beside those `rounded`, is judged again with them.
+    """
+    steps = readings.resolutions(record, rounded) | logger.interpolated(parts)
+    datas, verdicts, hidden = list[Data](), list[PartVerdict](), dict[str, Stairs]()
+    late = None if record.stated is None else record.late
+    for number, given in enumerate(parts, 1):
+        part = given if late is None or not isinstance(given, LaboratoryPart) else given.logged(late)
+        tell(part.name, number, len(parts))
+        data, verdict = judge_part(part, further, record, steps)
+        if anew := staircases.hidden(verdict.search, record):
+            hidden, steps = hidden | anew, steps | {name: stairs.step for name, stairs in anew.items()}
+            data, verdict = judge_part(part, further, record, steps)
+        datas.append(data)
+        verdicts.append(verdict)
+        late = late and logger.later(late, verdict, record)
+    return JudgedParts(datas, verdicts, steps, hidden)
+
+
+def remarks(
+    record: Record,
+    more: Sequence[Record],
+    datas: Sequence[Data],
+    verdicts: Sequence[PartVerdict],
+    held: Mapping[str, float],
+) -> list[str]:
+    """Sentences on what a recording can show, and on what is doubtful in its readings and verdicts."""
+    return [
+        *together(more),
+        *of_plan(record),
+        *not_recorded(record),
+        *reversed_signs(datas),
+        *repeating(held),
+        *outliers.told(verdicts),
+        *(verdict.own.text for verdict in verdicts if verdict.own is not None and verdict.own.text),
+        *doubted(verdicts),
+        *where.undecided(verdicts),
+    ]
+
+
+def with_own_error(verdict: PartVerdict, aside: Collection[str]) -> PartVerdict:
     """The verdict on a laboratory without a larger gap, with an error of one reading by itself as an unknown effect.
 
     Such an error moves nominal parameters a little, so that small gaps of other readings may follow from it. Of
@@ -195,8 +228,8 @@ def learnable(verdict: PartVerdict) -> bool:
     return verdict.outcome in UNNAMED and verdict.own is None
 
 
-def noise(verdicts: Sequence[PartVerdict], of: Callable[[Search], Array]) -> dict[str, float]:
-    """Rms noise of every reading by signal, of each part as `of` says."""
+def rms_by_signal(verdicts: Sequence[PartVerdict], of: Callable[[Search], Array]) -> dict[str, float]:
+    """Rms noise of every reading by signal, in each part what `of` says of its search."""
     searches = [item.search for item in verdicts]
     return readings.levels([item.data for item in searches], list(map(of, searches)))
 
@@ -222,7 +255,7 @@ def machines_first(
     return result, [item for item in noisy if signal.get(item) not in none]
 
 
-def seen(
+def judge_part(
     part: Part, further: Sequence[Part], record: Record, steps: Mapping[str, float]
 ) -> tuple[Data, PartVerdict]:
     """Residuals of a part and the verdict on it, which the same part of other recordings decides as well."""
@@ -230,7 +263,7 @@ def seen(
     data = residuals.prepare(part, record, steps)
     whole = joined(part, further, data.group)
     joint = data if whole is part else residuals.prepare(whole, record, steps)
-    return data, seen_in(data, judged(joint, scales, other_view(part, record, steps)))
+    return data, seen_in(data, verdict_on(joint, scales, other_view(part, record, steps)))
 
 
 def other_view(part: Part, record: Record, steps: Mapping[str, float]) -> Data | None:
@@ -239,7 +272,7 @@ def other_view(part: Part, record: Record, steps: Mapping[str, float]) -> Data |
     return None if view is None else residuals.prepare(view, record, view.rounded(steps))
 
 
-def judged(data: Data, scales: Scales, view: Data | None = None) -> PartVerdict:
+def verdict_on(data: Data, scales: Scales, view: Data | None = None) -> PartVerdict:
     """The verdict on a part; a building that no effect makes exact is judged as one whose forces a logger recorded.
 
     It is so from the start where the forces recorded have noise that those used had not.
@@ -249,10 +282,10 @@ def judged(data: Data, scales: Scales, view: Data | None = None) -> PartVerdict:
         if view is None or verdict.outcome not in UNNAMED:
             return verdict
     verdict = judge(search(view, scales))
-    return verdict if verdict.outcome in WITHOUT_GAP else still(view, scales) or verdict
+    return verdict if verdict.outcome in WITHOUT_GAP else verdict_over_longer(view, scales) or verdict
 
 
-def still(view: Data, scales: Scales) -> PartVerdict | None:
+def verdict_over_longer(view: Data, scales: Scales) -> PartVerdict | None:
     """The verdict on a building's balance over longer averages where these show no gap, else None.
 
     What its parameters or forces do shows over these as well; noise that only the controller read does not.

@@ -8,7 +8,8 @@ import numpy as np
 
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.gaps import QUIET
-from diagnosis.findings.verdict import PartVerdict, heard
+from diagnosis.findings.sensors.noise_levels import noise_rms
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.column_alone import ColumnAlone
@@ -30,7 +31,7 @@ def part(verdict: PartVerdict, found: Diagnosis, require: float | None) -> PartO
     """One part: what each correction in turn takes away from its gap above noise."""
     search = verdict.search
     data, bare, fit = search.data, search.commissioned, search.chosen
-    noise = rms(heard(search) / levels(data), data)
+    noise = rms(noise_rms(search) / levels(data), data)
     systems = [data.system, hypothesis.lay(data, bare.z, {}), hypothesis.lay(data, fit.z, fit.values)]
     systems.append(systems[-1])
     for law in found.learned:
@@ -69,8 +70,8 @@ def name_of(data: Data) -> str:
 def levels(data: Data) -> Array:
     """Rms of each reading (signals,), infinite for those that do not stand out of their noise while others do."""
     level = np.sqrt(np.mean(np.square(data.part.measured), axis=0))
-    heard = (level > 0.0) & (data.white < QUIET * level)
-    return np.where(heard, level, np.inf) if heard.any() else np.where(level > 0.0, level, np.inf)
+    stands_out = (level > 0.0) & (data.white < QUIET * level)
+    return np.where(stands_out, level, np.inf) if stands_out.any() else np.where(level > 0.0, level, np.inf)
 
 
 def above(data: Data, system: System, noise: float) -> float:

@@ -3,26 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from diagnosis.findings.certainty import trust
 from diagnosis.findings.certainty.intervals import Interval, intervals
+from diagnosis.findings.certainty.other_causes import described, other_causes, swings
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.sensors.leak import cell, leaks
-from diagnosis.findings.sensors.own_reading import errors, gives_energy
-from diagnosis.findings.verdict import (
-    EITHER,
-    UNNAMED,
-    PartVerdict,
-    loop_of_several,
-    small,
-    specimen_of_several,
-    swings,
-)
-from diagnosis.fits.fitting import Fit, without_rest
+from diagnosis.findings.verdict import PartVerdict
+from diagnosis.fits.fitting import Fit
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps
 from diagnosis.fits.worth import PRIOR_GAIN
@@ -51,7 +42,7 @@ def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Na
     effects += [reading.effect for reading in found.readings] + [item.effect for item in found.link]
     likely = float(np.prod([verdict.probability for verdict in found.verdicts]))
     if effects:
-        likely = trusted(found, named, signs, likely)
+        likely = trust.trusted(found, named, signs, likely)
     probability = min(sure, likely)
     if not effects:
         probability = min(probability, nothing(found))
@@ -68,35 +59,11 @@ def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Na
     first = entry(effects, probability, parameters, 0.0)
     ends = [warning for name, values in fits.items() for warning in at_the_end(catalogue[name], values)]
     as_good = [
-        sentence for verdict in named for sentence in (*other_numbers(verdict), *other_causes(verdict))
+        sentence
+        for verdict in named
+        for sentence in (*other_numbers(verdict), *other_causes(verdict.search), *swinging(verdict))
     ]
     return Named((first, *others[:MOST_OTHERS]), (*ends, *as_good))
-
-
-def trusted(
-    found: Diagnosis, named: Sequence[PartVerdict], signs: Mapping[str, float], costs: float
-) -> float:
-    """Probability of the effects named by what was learned of such verdicts.
-
-    Where nothing is left, the probability by `costs` is the most. Where something is left, costs only tell the effects
-    from the alternatives to them, and the share of the gap that is left lowers the probability.
-    """
-    if all(verdict.outcome not in UNNAMED for verdict in found.verdicts):
-        return min(costs, trust.EXPLAINED.probability(signs))
-    near = float(np.prod([trust.share_likeliest(verdict) for verdict in named]))
-    left = [item for item in named if item.outcome == "partly"]
-    shares = [trust.share_named(item.search.explained) for item in left]
-    probability = trust.less_by_freedom(min(near, trust.PARTLY.probability(signs), *shares), left)
-    doubtful = any(
-        trust.of_the_plan(item)
-        or without_rest(item.search.chosen)
-        or small(item.search)
-        or swings(item.searched)
-        or leaks(item.search.chosen)
-        or item.own is not None
-        for item in left
-    )
-    return EITHER * probability if doubtful else probability
 
 
 def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:
@@ -119,6 +86,16 @@ def at_the_end(effect: Effect, values: Mapping[str, Interval]) -> list[str]:
     ]
 
 
+def swinging(verdict: PartVerdict) -> list[str]:
+    """A sentence where something swings beside the effects of a part."""
+    if not swings(verdict.searched):
+        return []
+    return [
+        f"Beside {described(verdict.search.chosen)} something swings for many periods at a frequency of its own. It "
+        "looks like noise, but follows from what the machine was told. It may be another effect, or all of the gap."
+    ]
+
+
 def other_numbers(verdict: PartVerdict) -> list[str]:
     """A sentence for each description of a part by more or fewer effects that the data cannot tell from the verdict."""
     chosen = verdict.search.chosen
@@ -128,58 +105,6 @@ def other_numbers(verdict: PartVerdict) -> list[str]:
         for other in verdict.search.alternatives
         if len(other.names) != len(chosen.names) and tied(chosen, other)
     ]
-
-
-def other_causes(verdict: PartVerdict) -> list[str]:
-    """A sentence where another cause may look the same as what is named."""
-    if small(verdict.search):
-        return [
-            f"What {described(verdict.search.chosen)} explains is so small that two good solutions of one model may "
-            "differ by it. Something else as small may look the same."
-        ]
-    fit = verdict.search.chosen
-    sentences = [
-        f"{name} stands beside an effect that shows in this reading alone. Another law of the machine may look the "
-        "same: these signals cannot tell them apart."
-        for name in errors(fit)
-    ]
-    if name := gives_energy(fit):
-        sentences.append(
-            f"With {name} the column gives more energy than it ever took, since its force falls later than it rises. "
-            "Hysteresis of its load cell looks the same: these signals cannot tell them apart."
-        )
-    if name := leaks(fit):
-        sentences.append(
-            f"A leak of the charge of {cell(fit)} turns the phase of the force as {name} does: these signals cannot "
-            "tell them apart."
-        )
-    if swings(verdict.searched):
-        sentences.append(
-            f"Beside {described(fit)} something swings for many periods at a frequency of its own. It looks like "
-            "noise, but follows from what the machine was told. It may be another effect, or all of the gap."
-        )
-    loop, specimen = loop_of_several(verdict.search), specimen_of_several(verdict.search)
-    if loop:
-        sentences.append(
-            f"Several values of the plan are named of the {loop}. One other part of its loop, such as a filter in its "
-            "feedback, may look the same: these signals cannot tell them apart."
-        )
-    if specimen:
-        sentences.append(
-            f"Several effects of the {specimen} are named. One other law of this specimen may look the same: these "
-            "signals cannot tell them apart."
-        )
-    return sentences
-
-
-def described(fit: Fit) -> str:
-    """The effects of a fit, with the law of each that has not the first of its laws."""
-    laws = {name: fit.data.catalogue[name].law(values) for name, values in fit.values.items()}
-    words = [
-        f"{name} (law {law.name})" if law and fit.values[name].get("law") else name
-        for name, law in laws.items()
-    ]
-    return " with ".join(words)
 
 
 def seen(found: Diagnosis) -> dict[str, dict[str, Value]]:

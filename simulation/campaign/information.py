@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.findings.verdict import TEMPERATURE
+from diagnosis.findings.certainty.costs import TEMPERATURE
 from models.registry import Array
 
 

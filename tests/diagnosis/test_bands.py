@@ -17,7 +17,8 @@ from common.recording.reader import read
 from diagnosis.findings.for_prediction.as_reality import as_reality
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.sensors import readings
-from diagnosis.findings.verdict import heard, judge
+from diagnosis.findings.sensors.noise_levels import noise_rms
+from diagnosis.findings.verdict import judge
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.search import Search
 from diagnosis.recorded import record
@@ -97,7 +98,9 @@ def fitted(path: Path, effects: Effects) -> Diagnosis:
         }
         bare = fitting.fit(data, {})
         verdicts.append(judge(Search(data, bare, fitting.fit(data, own) if own else bare, ())))
-    white = readings.levels([one.search.data for one in verdicts], [heard(one.search) for one in verdicts])
+    white = readings.levels(
+        [one.search.data for one in verdicts], [noise_rms(one.search) for one in verdicts]
+    )
     return Diagnosis(shown, verdicts, (), (), {}, white)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from diagnosis.diagnose import judged
+from diagnosis.diagnose import verdict_on
 from diagnosis.findings.certainty.intervals import intervals, refined, spread
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import fitting, residuals
@@ -95,7 +95,7 @@ def test_a_cause_in_only_one_of_two_recordings_is_not_accepted(cases: Cases) -> 
     part = joined(lab_b(stuck), [lab_b(clean)], 4)
     part.candidates = tuple(effect for effect in part.candidates if effect.name in FRICTION)
     data = residuals.prepare(part, stuck)
-    assert judged(data, Scales(stuck)).outcome != "explained"
+    assert verdict_on(data, Scales(stuck)).outcome != "explained"
 
 
 def renamed(whole: Record) -> Record:

@@ -14,9 +14,9 @@ from scipy import signal
 
 from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, LoggerFilter
 from common.roles import MASTER
-from diagnosis.diagnose import judged, own_noise, still
+from diagnosis.diagnose import own_noise, verdict_on, verdict_over_longer
 from diagnosis.findings import gaps, how_far, report, verdict
-from diagnosis.findings.certainty import trust
+from diagnosis.findings.certainty import costs, trust
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logger import by_building
 from diagnosis.fits import fitting, hypothesis, residuals, settling, worth
@@ -169,8 +169,8 @@ def test_a_motion_in_several_readings_is_not_taken_for_pickup(cases: Cases) -> N
 
 def test_large_errors_of_all_nominal_parameters_make_an_effect_less_certain(drifting: Search) -> None:
     far = replace(drifting.chosen, z=np.full(drifting.chosen.z.size, 2.9))
-    assert verdict.certainty(drifting) > 0.9
-    assert verdict.certainty(replace(drifting, chosen=far)) < 0.5
+    assert costs.certainty(drifting) > 0.9
+    assert costs.certainty(replace(drifting, chosen=far)) < 0.5
     worse = replace(far, reduced=far.reduced + 1.0)
     assert verdict.judge(replace(drifting, chosen=worse)).outcome == "unknown"
 
@@ -250,9 +250,9 @@ def test_noise_that_only_the_controller_read_is_no_fault_of_the_building(cases: 
     )
     view, scales = logged(unread), Scales(unread)
     assert verdict.judge(search(view, scales)).outcome == "unknown"
-    assert judged(residuals.prepare(Building(unread), unread), scales, view).outcome == "none"
+    assert verdict_on(residuals.prepare(Building(unread), unread), scales, view).outcome == "none"
     heavier = cases.record({"structure.mass": {"factor": 1.1}})
-    assert still(logged(heavier), scales) is None
+    assert verdict_over_longer(logged(heavier), scales) is None
 
 
 def stated(whole: Record, names: Sequence[str], noise: float = LEVEL) -> Record:

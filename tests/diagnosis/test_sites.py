@@ -12,12 +12,12 @@ from scipy import signal
 
 from common.recording.imported import ImportedChannel
 from diagnosis.findings import where
+from diagnosis.findings.certainty.other_causes import other_causes
 from diagnosis.findings.sensors.leak import leaked, leaks
 from diagnosis.findings.sensors.own_reading import gives_energy
 from diagnosis.findings.sites import functions, likely
 from diagnosis.findings.sites.likely import APART, likely_sites, ranked
-from diagnosis.findings.verdict import judge, misplaced, other_cause
-from diagnosis.findings.which import other_causes
+from diagnosis.findings.verdict import judge, misplaced
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
@@ -252,7 +252,7 @@ def test_a_column_that_gives_energy_may_be_a_load_cell_with_hysteresis(
     found = judge(Search(data, fitting.fit(data, {}), fitting.fit(data, effects), ()))
     assert found.effects == ("column.slip",)
     assert (found.probability < 0.5) == gives
-    assert ["Hysteresis of its load cell" in text for text in other_causes(found)] == [True] * gives
+    assert ["Hysteresis of its load cell" in text for text in other_causes(found.search)] == [True] * gives
 
 
 def test_a_force_that_a_logger_or_a_sensor_delays_gives_no_energy(cases: Cases) -> None:
@@ -297,15 +297,14 @@ def viscous(data: Data) -> Search:
 def test_a_leak_of_a_load_cell_is_said_beside_the_dashpot_that_it_looks_like(cases: Cases) -> None:
     found = viscous(with_a_leak(cases.record(duration=SECONDS), 20.0))
     assert leaks(found.chosen) == "column.viscous"
-    assert other_cause(found)
-    assert "sensor.column_force" in other_causes(judge(found))[0]
+    assert "sensor.column_force" in next(other_causes(judge(found).search))
 
 
 def test_a_dashpot_of_a_column_is_no_leak(cases: Cases) -> None:
     whole = cases.record({"column.viscous": {"coefficient": 2e4}}, duration=SECONDS)
     found = viscous(residuals.prepare(lab_a(whole), whole))
     assert leaks(found.chosen) == ""
-    assert not other_cause(found)
+    assert not any(other_causes(found))
 
 
 def test_an_effect_that_explains_nothing_is_no_leak(cases: Cases) -> None:

@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnosis.findings.verdict import EITHER, judge, other_cause
-from diagnosis.findings.which import other_causes, trusted
+from diagnosis.findings.certainty.other_causes import EITHER, other_causes
+from diagnosis.findings.certainty.trust import trusted
+from diagnosis.findings.verdict import judge
 from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
@@ -61,7 +62,6 @@ def test_the_name_of_so_small_a_gap_is_half_as_probable(cases: Cases) -> None:
     found = search(residuals.prepare(lab_a(whole), whole), Scales(whole))
     assert judge(found).outcome == "explained"
     faint = replace(found, data=found.data.fine)
-    assert other_cause(faint)
     verdict = judge(faint)
     assert verdict.outcome == "partly"
     usual = replace(verdict, search=found)
@@ -71,4 +71,4 @@ def test_the_name_of_so_small_a_gap_is_half_as_probable(cases: Cases) -> None:
     )
     assert probability == pytest.approx(EITHER * otherwise)
     assert probability < 0.5
-    assert "two good solutions" in other_causes(verdict)[0]
+    assert "two good solutions" in next(other_causes(faint))

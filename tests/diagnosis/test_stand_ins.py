@@ -11,11 +11,13 @@ from scipy import signal
 
 from diagnosis.diagnose import doubted, examine
 from diagnosis.findings import where
+from diagnosis.findings.certainty.costs import farthest
+from diagnosis.findings.certainty.other_causes import other_causes
 from diagnosis.findings.certainty.trust import less_by_freedom, of_the_plan, share_named
 from diagnosis.findings.report import status_of
 from diagnosis.findings.sensors.own_reading import machine_alone
 from diagnosis.findings.sensors.slow_noise import lone_noise
-from diagnosis.findings.verdict import PartVerdict, allowed, artefact, farthest, judge, other_cause
+from diagnosis.findings.verdict import PartVerdict, allowed, artefact, judge
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
 from diagnosis.fits.fitting import Fit, at_end, without_rest
 from diagnosis.fits.hypothesis import TOLERANCES, Values
@@ -108,7 +110,9 @@ def test_a_small_error_of_a_load_cell_is_the_law_of_its_specimen(
     found = Search(data, fitting.fit(data, {}), fitting.fit(data, effects), ())
     stands = machine_alone(found)
     assert stands.chosen.names == tuple(effects)[: 1 + others]
-    assert other_cause(stands) == (others == 1)  # a law of the specimen and what its load cell makes of it
+    assert any(other_causes(stands)) == (
+        others == 1
+    )  # a law of the specimen and what its load cell makes of it
 
 
 def test_errors_of_readings_that_leave_a_tenth_of_a_gap_are_not_its_cause() -> None:

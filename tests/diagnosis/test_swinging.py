@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from diagnosis.findings.verdict import judge, swings
-from diagnosis.findings.which import other_causes, trusted
+from diagnosis.findings.certainty.other_causes import swings
+from diagnosis.findings.certainty.trust import trusted
+from diagnosis.findings.verdict import judge
+from diagnosis.findings.which import swinging
 from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
@@ -122,7 +124,7 @@ def test_what_swings_beside_a_name_leaves_that_partly_explained(cases: Cases) ->
     assert verdict.outcome == "partly"
     probability = trusted(SimpleNamespace(verdicts=[verdict]), [verdict], SIGNS, 1.0)  # type: ignore[arg-type]
     assert probability < 0.5
-    assert "swings for many periods" in other_causes(verdict)[0]
+    assert "swings for many periods" in swinging(verdict)[0]
 
 
 def test_a_mass_that_does_not_swing_is_explained(cases: Cases) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.findings.which import described
+from diagnosis.findings.certainty.other_causes import described
 from diagnosis.fits import candidates, fitting, trade, worth
 from diagnosis.fits.fitting import TIED, Fit
 from diagnosis.fits.laws import best

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.diagnose import by_itself, diagnose, machines_first
+from diagnosis.diagnose import diagnose, machines_first, with_own_error
 from diagnosis.findings.certainty.trust import share_likeliest
 from diagnosis.findings.sensors import jumps, outliers, swaying, uneven_noise
 from diagnosis.findings.sensors.readings import SensorFinding
@@ -105,14 +105,14 @@ def test_an_error_of_one_reading_is_told_in_place_of_a_smaller_gap_of_the_smalle
     for kind in (outliers, jumps, swaying):
         monkeypatch.setattr(kind, "own_error", lambda *_: None)
     monkeypatch.setattr(uneven_noise, "own_error", lambda *_: own)
-    assert by_itself(verdict, ()).own == (own if told else None)
+    assert with_own_error(verdict, ()).own == (own if told else None)
 
 
 def test_readings_of_which_something_is_known_are_left_aside(cases: Cases) -> None:
     whole = erring(cases.record(duration=8.0), "damper_stroke")
     part = lab_b(whole)
     verdict = judge(search(residuals.prepare(part, whole), Scales(whole)))
-    assert by_itself(verdict, ()).outcome == "unknown"
+    assert with_own_error(verdict, ()).outcome == "unknown"
     assert uneven_noise.own_error(verdict, part) is not None
     assert uneven_noise.own_error(verdict, part, {"damper_stroke"}) is None
 

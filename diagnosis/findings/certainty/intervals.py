@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm, t
 
-from diagnosis.findings.verdict import PartVerdict, odds
+from diagnosis.findings.certainty.costs import odds
+from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Free, Problem

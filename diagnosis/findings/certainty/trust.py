@@ -13,10 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from diagnosis.findings.certainty.other_causes import EITHER, small, swings
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.sensors.leak import leaks
 from diagnosis.findings.sites.likely import TRUE_LEAVES
-from diagnosis.findings.verdict import PartVerdict
+from diagnosis.findings.verdict import UNNAMED, PartVerdict
 from diagnosis.fits import hypothesis, worth
+from diagnosis.fits.fitting import without_rest
 from diagnosis.fits.laws.best import BETTER
 from diagnosis.fits.trade import freedom
 from diagnosis.fits.unexplained import MATERIAL
@@ -40,6 +43,32 @@ class Weights(NamedTuple):
 # Learned from 113 verdicts that leave nothing and from 33 that leave something (ADR 0052).
 EXPLAINED = Weights(2.93, {"clear": 0.0805, "names": -0.719})
 PARTLY = Weights(-0.569, {"clear": 0.225, "names": -0.113})
+
+
+def trusted(
+    found: Diagnosis, named: Sequence[PartVerdict], signs: Mapping[str, float], costs: float
+) -> float:
+    """Probability of the effects named by what was learned of such verdicts.
+
+    Where nothing is left, the probability by `costs` is the most. Where something is left, costs only tell the effects
+    from the alternatives to them, and the share of the gap that is left lowers the probability.
+    """
+    if all(verdict.outcome not in UNNAMED for verdict in found.verdicts):
+        return min(costs, EXPLAINED.probability(signs))
+    near = float(np.prod([share_likeliest(verdict) for verdict in named]))
+    left = [item for item in named if item.outcome == "partly"]
+    shares = [share_named(item.search.explained) for item in left]
+    probability = less_by_freedom(min(near, PARTLY.probability(signs), *shares), left)
+    doubtful = any(
+        of_the_plan(item)
+        or without_rest(item.search.chosen)
+        or small(item.search)
+        or swings(item.searched)
+        or leaks(item.search.chosen)
+        or item.own is not None
+        for item in left
+    )
+    return EITHER * probability if doubtful else probability
 
 
 def share_named(explained: float) -> float:

@@ -89,7 +89,7 @@ def stated_steps(record: Record) -> dict[str, float]:
     return {name: step for name, step in rows.items() if step > 0.0}
 
 
-def resolutions(record: Record, rounded: dict[str, float]) -> dict[str, float]:
+def resolutions(record: Record, rounded: Mapping[str, float]) -> dict[str, float]:
     """Rounding steps by signal: `rounded`, or that from before an interpolation, or the one stated for a channel.
 
     The second is a logger's, and so no error of a sensor.
@@ -99,7 +99,7 @@ def resolutions(record: Record, rounded: dict[str, float]) -> dict[str, float]:
         if name not in rounded and record.has(name):
             step = quantum_between(record.signals[name][record.present[name]])
             found |= {name: step} if step > 0.0 else {}
-    return found | rounded
+    return {**found, **rounded}
 
 
 def held(record: Record, steps: Mapping[str, float]) -> dict[str, float]:

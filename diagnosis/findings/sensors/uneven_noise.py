@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from diagnosis.findings.certainty.other_causes import EITHER
 from diagnosis.findings.sites.signatures import alone
-from diagnosis.findings.verdict import EITHER, OwnError, PartVerdict
+from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.unexplained import BOTH

@@ -1,0 +1,109 @@
+"""Other causes that look the same as the effects named, to the last of what can be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from diagnosis.findings.sensors.leak import cell, leaks
+from diagnosis.findings.sensors.one_motion import one_place
+from diagnosis.findings.sensors.own_reading import errors, gives_energy, of_column
+from diagnosis.findings.sites.signatures import laboratory_of
+from diagnosis.fits import hypothesis
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.search import Search
+from diagnosis.fits.unexplained import foresees, model_error
+from diagnosis.recorded.parts import MODEL_ERROR
+
+# Probability of several effects of which one unknown cause may look the same, over that without: half, as one cause is
+# no less likely than two.
+EITHER = 0.5
+
+
+def other_causes(search: Search) -> Iterator[str]:
+    """A sentence for each cause that may look the same as the effects named; a small gap may have any cause.
+
+    Any one of them makes the effects half as probable. They are found one by one, as they are asked for.
+    """
+    fit = search.chosen
+    if small(search):
+        yield (
+            f"What {described(fit)} explains is so small that two good solutions of one model may differ by it. "
+            "Something else as small may look the same."
+        )
+        return
+    for name in errors(fit):
+        yield (
+            f"{name} stands beside an effect that shows in this reading alone. Another law of the machine may look the "
+            "same: these signals cannot tell them apart."
+        )
+    if name := gives_energy(fit):
+        yield (
+            f"With {name} the column gives more energy than it ever took, since its force falls later than it rises. "
+            "Hysteresis of its load cell looks the same: these signals cannot tell them apart."
+        )
+    if loop := loop_of_several(search):
+        yield (
+            f"Several values of the plan are named of the {loop}. One other part of its loop, such as a filter in its "
+            "feedback, may look the same: these signals cannot tell them apart."
+        )
+    if specimen := specimen_of_several(search):
+        yield (
+            f"Several effects of the {specimen} are named. One other law of this specimen may look the same: these "
+            "signals cannot tell them apart."
+        )
+    if one_place(search):
+        yield (
+            f"The offsets of {described(fit)} follow from one another as where a machine stands elsewhere, such as "
+            "behind a valve that opens later on one side: these signals cannot tell them apart."
+        )
+    if name := leaks(fit):
+        yield (
+            f"A leak of the charge of {cell(fit)} turns the phase of the force as {name} does: these signals cannot "
+            "tell them apart."
+        )
+
+
+def loop_of_several(search: Search) -> str:
+    """The transfer system of which several values of the plan are named, empty for none.
+
+    Its loop has more parts than the plan has values of it: a filter in its feedback looks like a shorter time constant
+    with a longer delay, and leaves nothing to be seen.
+    """
+    data, part = search.data, laboratory_of(search.data.part)
+    if part is None:
+        return ""
+    loop = part.lab.site(part.lab.kind.sites[0])
+    values = hypothesis.values_of_plan(data, search.chosen.values)
+    return loop if sum(data.catalogue[name].site == loop for name in values) > 1 else ""
+
+
+def specimen_of_several(search: Search) -> str:
+    """The column of which several effects are named that are not all values of the plan, empty for none.
+
+    Each of its effects is a force that follows from one motion, as is the law of any specimen that the catalogue lacks:
+    two of them together imitate it.
+    """
+    site, values = of_column(search.chosen)
+    laws = len(values) - len(hypothesis.values_of_plan(search.data, values))
+    return site if len(values) > 1 and laws > 0 else ""
+
+
+def small(search: Search) -> bool:
+    """Whether a gap is so small that two good solutions of one model may differ by it: its cause may be anything."""
+    return search.data.erring < MODEL_ERROR
+
+
+def swings(search: Search) -> bool:
+    """Whether effects leave a resonance that the inputs swing: another mechanism, as no law leaves one."""
+    related, fit = search.data.related, search.chosen
+    return related is not None and related.swings and foresees(fit, model_error(fit))
+
+
+def described(fit: Fit) -> str:
+    """The effects of a fit, with the law of each that has not the first of its laws."""
+    laws = {name: fit.data.catalogue[name].law(values) for name, values in fit.values.items()}
+    words = [
+        f"{name} (law {law.name})" if law and fit.values[name].get("law") else name
+        for name, law in laws.items()
+    ]
+    return " with ".join(words)
