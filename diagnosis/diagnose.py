@@ -22,7 +22,6 @@ from diagnosis.findings.sensors.loud_noise import no_noise
 from diagnosis.findings.sensors.noise_levels import highest_rms, lines_rms, noise_rms
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.sensors.staircases import Stairs
-from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.findings.verdict import (
     UNNAMED,
     WITHOUT_GAP,
@@ -37,7 +36,7 @@ from diagnosis.fits.search import Search, search
 from diagnosis.learned.learn import learn
 from diagnosis.recorded.divided import BUILDING, driven, parts_of, used
 from diagnosis.recorded.ground import Ground
-from diagnosis.recorded.joined import joined, refuse_others
+from diagnosis.recorded.joined import joined, laboratory_of, refuse_others
 from diagnosis.recorded.link import effects as link_effects
 from diagnosis.recorded.link import exchange
 from diagnosis.recorded.link.exchange import LinkFinding

@@ -48,7 +48,7 @@ def build(
     """The whole report without its verdict in words; `require` is the gap that may be left in each part."""
     tell("how far the gap closes", 0, 0)
     far = how_far.judge(found, validation)
-    found, learned, doubts = rest.judged(found, validation)
+    found, learned, doubts = rest.with_laws_that_hold(found, validation)
     status = status_of(found)
     shrunk = status != "explained" or how_far.shrinks(found, far.how_far)
     signs = trust.signs(found)

@@ -43,7 +43,7 @@ class Gaps(NamedTuple):
     on: str  # the data
 
 
-def judged(
+def with_laws_that_hold(
     found: Diagnosis, validation: Sequence[Record]
 ) -> tuple[Diagnosis, LearnedGap | None, tuple[str, ...]]:
     """The findings without learned laws that do not hold, how far the others close the gap, and warnings.

@@ -9,7 +9,6 @@ from functools import lru_cache
 import numpy as np
 
 from diagnosis.findings.sites.likely import likely_sites
-from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.findings.verdict import PartVerdict, pinned
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
@@ -17,6 +16,7 @@ from diagnosis.fits.residuals import Data
 from diagnosis.fits.unexplained import gaps
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.column_alone import ColumnAlone
+from diagnosis.recorded.joined import laboratory_of
 from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
 from models.registry import Array

@@ -63,7 +63,7 @@ class Data:
     spikes: Mask | None = None  # (ticks, signals) single samples that do not count
     related: Crosswise | None = None  # what may follow from the part's inputs
     planned: Array | None = None  # (signals,) rms noise by the plan, 0 for none
-    heard: Array | None = None  # (signals,) coloured noise that other signals' gaps made doubtful, 0 for none
+    undoubted: Array | None = None  # (signals,) rms coloured noise of signals that hide no gap, 0 for others
     # (groups, signals) times the noise that an averaged sample behind an impact is known to; None where none is
     vague: Array | None = None
     erring: float = MODEL_ERROR  # share of a reading's rms that a good solution of the model may err by

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from common.plan.kinds import COLUMN
 from diagnosis.fits import candidates, contact, fitting, hypothesis, settling, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.laws.coupled import coupled
@@ -17,8 +16,7 @@ from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, foresees, leaves, model_error, remaining, resonant
-from diagnosis.recorded.joined import JoinedPart
-from diagnosis.recorded.parts import LaboratoryPart, Part
+from diagnosis.recorded.joined import column_of
 
 MOST = 3  # effects of one part, the bias of a sensor aside: more of them can imitate any residual
 # Effects of one part that leave only noise, each of them needed for that; the share of what is left that each must
@@ -61,16 +59,10 @@ def search(data: Data, scales: Scales) -> Search:
     """
     found, fine = at_any_size(data, scales)
     named = found.chosen
-    asked = named.names and of_column(data.part) and not leaves(named, model_error(named))
+    asked = named.names and column_of(data.part) and not leaves(named, model_error(named))
     left = named if asked else fine
     swings = None if left is None else resonant(left)
     return found if swings is None else at_any_size(replace(data, related=swings), scales)[0]
-
-
-def of_column(part: Part) -> bool:
-    """Whether a part is a laboratory with a column."""
-    first = part.pieces[0] if isinstance(part, JoinedPart) else part
-    return isinstance(first, LaboratoryPart) and first.lab.kind.name == COLUMN
 
 
 def at_any_size(data: Data, scales: Scales) -> tuple[Search, Fit | None]:

@@ -62,7 +62,7 @@ def settled(fit: Fit, accepted: Data | None = None) -> Fit:
         if not hidden(found, accepted):
             return replace(found, data=data) if found.data is not data else found
         data = sensor_noise.flattened(sensor_noise.remodelled(fit))
-        data = replace(data, lines=sensor_noise.mains(found), spikes=None, heard=heard(found))
+        data = replace(data, lines=sensor_noise.mains(found), spikes=None, undoubted=undoubted_noise(found))
     return under_white(found, data, fit.data)
 
 
@@ -83,7 +83,9 @@ def under_white(fit: Fit, data: Data, before: Data) -> Fit:
     """The fit under white noise: that of `before` where it is no lower."""
     changed = bool(before.noise) or data.lines is not None or data.spikes is not None
     data = (
-        data if changed or quieter(data, before) else replace(before, related=data.related, heard=data.heard)
+        data
+        if changed or quieter(data, before)
+        else replace(before, related=data.related, undoubted=data.undoubted)
     )
     found = fitting.at(data, fit.values, fit.z)
     return fitting.polished(found) if found.names and leaves(found) else found
@@ -138,7 +140,7 @@ def doubtful(fit: Fit) -> Mask:
     return np.array(seen) | (np.array(uneven) & (sensor_noise.loudest(fit) > LOUDEST))
 
 
-def heard(fit: Fit) -> Array:
+def undoubted_noise(fit: Fit) -> Array:
     """Rms (signals,) of the coloured noise of signals that show no gap, beside others that may; 0 for none."""
     leaving = [
         item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in gaps(fit, fit.data.group)
@@ -154,7 +156,7 @@ def louder(data: Data, accepted: Data | None) -> bool:
     """
     if no_louder(data, accepted):
         return False
-    known = None if accepted is None or sensor_noise.coloured(accepted) else accepted.heard
+    known = None if accepted is None or sensor_noise.coloured(accepted) else accepted.undoubted
     more = np.zeros(data.white.size) if known is None else known
     return bool(np.any((sensor_noise.shares(data) > SMALL) & (more < sensor_noise.LOWER * data.white)))
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from common.errors import InputError
-from diagnosis.recorded.parts import Part
+from common.plan.kinds import COLUMN
+from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.recorded.record import Record
 from models.registry import Array
 from models.system import System
@@ -77,6 +78,18 @@ def joined(part: Part, others: Sequence[Part], group: int) -> Part:
         return part
     pieces = [one.first(len(one.measured) // group * group) for one in (part, *same)]
     return JoinedPart(pieces)
+
+
+def laboratory_of(part: Part) -> LaboratoryPart | None:
+    """The laboratory of a part, of the first recording where it is that of several; None of other parts."""
+    first = part.pieces[0] if isinstance(part, JoinedPart) else part
+    return first if isinstance(first, LaboratoryPart) else None
+
+
+def column_of(part: Part) -> LaboratoryPart | None:
+    """The laboratory of a part if it has a column under an actuator, else None."""
+    lab = laboratory_of(part)
+    return lab if lab is not None and lab.lab.kind.name == COLUMN else None
 
 
 def refuse_others(record: Record, others: Sequence[Record]) -> None:

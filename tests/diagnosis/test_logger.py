@@ -82,14 +82,14 @@ def test_a_reading_without_a_gap_may_be_as_loud_beside_an_effect_on_another_one(
     whole = imported(cases.record({"sensor.column_displacement.gain": {"factor": 0.8}}), noisy)
     data = residuals.prepare(lab_a(whole), whole)
     bare = settling.settled(fitting.fit(data, {})).data
-    assert bare.heard is not None
-    assert bare.heard[0] == 0.0
-    assert bare.heard[1] > 0.0
+    assert bare.undoubted is not None
+    assert bare.undoubted[0] == 0.0
+    assert bare.undoubted[1] > 0.0
     beside = sensor_noise.modelled(data, System(whole.plan))
     beside = replace(beside, noise=tuple(replace(item, steady=False) for item in beside.noise))
     assert settling.louder(beside, None)
-    assert settling.louder(beside, replace(bare, heard=0.5 * beside.white))
-    assert not settling.louder(beside, replace(bare, heard=beside.white))
+    assert settling.louder(beside, replace(bare, undoubted=0.5 * beside.white))
+    assert not settling.louder(beside, replace(bare, undoubted=beside.white))
 
 
 def test_loud_noise_that_may_follow_the_motion_is_too_few_data_where_inputs_cannot_be_asked(
@@ -98,11 +98,11 @@ def test_loud_noise_that_may_follow_the_motion_is_too_few_data_where_inputs_cann
     verdict = examine(imported(cases.record(), noisy)).verdicts[-1]
     data = verdict.search.data
     doubtful = replace(data, noise=tuple(replace(item, steady=False) for item in data.noise))
-    heard = [
+    seen = [
         report.unheard(replace(verdict, search=replace(verdict.search, data=one)))
         for one in (data, doubtful, replace(data, related=None), replace(doubtful, related=None))
     ]
-    assert heard == [False, False, False, True]
+    assert seen == [False, False, False, True]
 
 
 def test_a_loud_first_sample_is_no_beginning_in_motion(cases: Cases) -> None:

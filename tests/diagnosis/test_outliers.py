@@ -69,14 +69,14 @@ def test_a_reading_without_noise_has_no_outliers(cases: Cases) -> None:
 @pytest.mark.parametrize("freedom", [3.0, 4.0, 30.0])
 def test_heavy_tails_are_noise(freedom: float) -> None:
     draws = np.random.default_rng(5).standard_t(freedom, (20, 6000))
-    found = [outliers.judged(spikes(x), beyond(x) / deviation(beyond(x))) for x in draws]
+    found = [outliers.beyond_tails(spikes(x), beyond(x) / deviation(beyond(x))) for x in draws]
     assert all(one is None for one in found)
 
 
 def test_a_few_samples_above_heavy_tails_are_none() -> None:
     noise = np.random.default_rng(6).standard_t(3.0, 6000)
     noise[[500, 2500, 4000]] += 300.0
-    found = outliers.judged(spikes(noise), beyond(noise) / deviation(beyond(noise)))
+    found = outliers.beyond_tails(spikes(noise), beyond(noise) / deviation(beyond(noise)))
     assert found is not None
     assert found[0].tolist() == [500, 2500, 4000]
     assert found[1] < outliers.SURE

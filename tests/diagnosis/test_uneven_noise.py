@@ -126,7 +126,7 @@ def motion() -> Array:
 def judged(noise: Array, erring: Array) -> uneven_noise.Uneven:
     """How much of a noise follows that input."""
     rows = [uneven_noise.amplitudes(motion(), size) for size in uneven_noise.SCALES]
-    return uneven_noise.judged(noise, rows, erring)
+    return uneven_noise.over_scales(noise, rows, erring)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from diagnosis.findings.sensors.leak import cell, leaks
 from diagnosis.findings.sensors.one_motion import one_place
 from diagnosis.findings.sensors.own_reading import errors, gives_energy, of_column
-from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.search import Search
 from diagnosis.fits.unexplained import foresees, model_error
+from diagnosis.recorded.joined import laboratory_of
 from diagnosis.recorded.parts import MODEL_ERROR
 
 # Probability of several effects of which one unknown cause may look the same, over that without: half, as one cause is

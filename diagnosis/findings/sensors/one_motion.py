@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.findings.sites.likely import APART, TRUE_LEAVES, ranked
-from diagnosis.findings.sites.signatures import laboratory_of, signatures
+from diagnosis.findings.sites.signatures import signatures
 from diagnosis.fits import hypothesis
 from diagnosis.fits.search import Search
+from diagnosis.recorded.joined import laboratory_of
 from laboratories.effects.sites import is_sensor
 
 STILL = np.array([1e-3])  # Hz, at which a machine stands where its constant force or place puts it

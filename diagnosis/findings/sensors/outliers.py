@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage, stats
 
-from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.findings.verdict import UNNAMED, OwnError, PartVerdict
 from diagnosis.fits import hypothesis
 from diagnosis.fits.residuals import filled
 from diagnosis.fits.worth import SEEN
+from diagnosis.recorded.joined import laboratory_of
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.spikes import BEYOND, LONGEST, beyond, deviation, spikes
@@ -61,7 +61,7 @@ def found_in(verdict: PartVerdict) -> list[Outliers]:
         apart = beyond(x)
         usual = np.maximum(deviation(apart), max(data.white[place], data.rounded[place]))
         sizes = np.divide(apart, usual, where=usual > 0.0, out=np.zeros(apart.size))  # no noise, no spikes
-        if (found := judged(own, sizes)) is not None:
+        if (found := beyond_tails(own, sizes)) is not None:
             ticks, chance = found
             energy = math.sqrt(float(np.mean(np.square(np.where(own, sizes, 0.0)))))
             times = tuple(float(tick) * interval for tick in ticks)
@@ -69,7 +69,7 @@ def found_in(verdict: PartVerdict) -> list[Outliers]:
     return result
 
 
-def judged(spiky: Mask, sizes: Array) -> tuple[Array, float] | None:
+def beyond_tails(spiky: Mask, sizes: Array) -> tuple[Array, float] | None:
     """The ticks of the spikes that tails do not make, and how probably they would; None where they may make all.
 
     Of n spikes, tails make one larger than s with (BEYOND/s)^power: how many are larger is binomial.

@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from common.plan.kinds import COLUMN
 from common.recording.imported import NOTHING_STATED
 from diagnosis.findings.sites.likely import TRUE_LEAVES
-from diagnosis.findings.sites.signatures import laboratory_of
 from diagnosis.fits import candidates, hypothesis, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.search import Search
+from diagnosis.recorded.joined import column_of
 
 # Share of the most energy that a specimen ever held, from which on it gave some that it never had: of steps in time and
 # of noise in commands 0.002 was the most; a load cell that lags by 0.8 % of its range had 0.23.
@@ -52,8 +51,8 @@ def errors(fit: Fit) -> list[str]:
 
 def of_column(fit: Fit) -> tuple[str, Values]:
     """The site of the column in a fit's laboratory, and the effects there; empty where the laboratory has no column."""
-    part = laboratory_of(fit.data.part)
-    if part is None or part.lab.kind.name != COLUMN:
+    part = column_of(fit.data.part)
+    if part is None:
         return "", {}
     site = part.lab.site("column")
     return site, {
@@ -67,7 +66,7 @@ def gives_energy(fit: Fit) -> str:
     Its force falls later than it rises. No specimen by itself does that, while a load cell with hysteresis reads any
     specimen so.
     """
-    data, part = fit.data, laboratory_of(fit.data.part)
+    data, part = fit.data, column_of(fit.data.part)
     _, own = of_column(fit)
     if part is None or not own:
         return ""

@@ -60,14 +60,14 @@ def uneven(fit: Fit) -> list[Uneven]:
     said = np.nan_to_num(data.part.predict(system))[: len(single)]
     erring = BOTH * data.erring
     return [
-        judged(single[:, place], motions, erring * said[:, place])
+        over_scales(single[:, place], motions, erring * said[:, place])
         if live and rounded <= ROUNDED * white
         else STEADY
         for place, (live, rounded, white) in enumerate(zip(data.live, data.rounded, data.white, strict=True))
     ]
 
 
-def judged(noise: Array, motions: Sequence[Array], erring: Array) -> Uneven:
+def over_scales(noise: Array, motions: Sequence[Array], erring: Array) -> Uneven:
     """How much of a noise (ticks,) follows motions beyond an error `erring` (ticks,).
 
     These are the `amplitudes` of each of the scales.

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from diagnosis.findings.sensors.common_noise import in_common
 from diagnosis.findings.sites import functions
-from diagnosis.findings.sites.signatures import Signature, Spectrum, laboratory_of, signatures
+from diagnosis.findings.sites.signatures import Signature, Spectrum, signatures
 from diagnosis.fits import fitting, hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.residuals import Data
+from diagnosis.recorded.joined import laboratory_of
 from laboratories.effects.sites import is_sensor
 from models.registry import Array
 
@@ -99,7 +100,7 @@ def ranked(fit: Fit) -> list[LikelySite]:
         fit = fitting.at(in_common(fit), fit.values, fit.z)
     given = spectra(fit)
     system = hypothesis.lay(fit.data, fit.z, fit.values)
-    found = [judged(given, item) for item in signatures(part, system, given.frequencies)]
+    found = [site_cost(given, item) for item in signatures(part, system, given.frequencies)]
     rows = sorted((item for item in found if item is not None), key=lambda item: item.cost)
     best: dict[str, LikelySite] = {}
     for row in rows:
@@ -147,7 +148,7 @@ def bands(frequencies: Array) -> NDArray[np.int64]:
     return np.array(edges)
 
 
-def judged(given: Spectra, signature: Signature) -> LikelySite | None:
+def site_cost(given: Spectra, signature: Signature) -> LikelySite | None:
     """A site with what speaks against it, up to a constant of all sites; None where no recorded reading shows it."""
     columns = signature.readings * given.scale
     length = np.linalg.norm(columns, axis=1)

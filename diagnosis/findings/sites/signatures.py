@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.plan.kinds import COLUMN, TABLE
-from diagnosis.recorded.joined import JoinedPart
+from diagnosis.recorded.joined import laboratory_of as laboratory_of  # noqa: PLC0414 - for the module on leaks
 from diagnosis.recorded.laboratory import RecordedLaboratory
-from diagnosis.recorded.parts import LaboratoryPart, Part
+from diagnosis.recorded.parts import LaboratoryPart
 from laboratories.effects.sites import is_sensor
 from models.registry import Array
 from models.system import System
@@ -51,12 +51,6 @@ class Way(NamedTuple):
     rare: bool = False
     motion: int | None = None
     receptance: Spectrum | None = None
-
-
-def laboratory_of(part: Part) -> LaboratoryPart | None:
-    """The laboratory of a part, of the first recording where it is that of several; None of other parts."""
-    first = part.pieces[0] if isinstance(part, JoinedPart) else part
-    return first if isinstance(first, LaboratoryPart) else None
 
 
 def signatures(part: LaboratoryPart, system: System, frequencies: Array) -> list[Signature]:
