@@ -26,6 +26,7 @@ UNSEEN = 0.5  # motion over the noise of the displacement sensor below which tha
 # A window belongs to a trace from this share of the trace's largest window on, but never above the second, so that the
 # strongest window always counts.
 PART_OF_PEAK, BELOW_PEAK = 0.25, 0.9
+DISPLACEMENT, ACCELERATION = 0, 1  # places of the table among the readings of its laboratory
 ASKED = 8  # fits whose sites are kept: a report asks for those of each part several times
 
 
@@ -131,14 +132,14 @@ def hidden_in_displacement(fit: Fit) -> bool:
     """Whether the motion behind an acceleration's residual is too small for the displacement sensor to show."""
     data = fit.data
     interval = data.system.plan.test.interval
-    series = data.residual(hypothesis.lay(data, fit.z, fit.values))[:, 1]
+    series = data.residual(hypothesis.lay(data, fit.z, fit.values))[:, ACCELERATION]
     spectrum = np.fft.rfft(series)
     omega = 2.0 * np.pi * np.fft.rfftfreq(series.size, interval)
     fast = omega > 2.0 * np.pi * OWN_MOTION
     motion = np.zeros_like(spectrum)
     motion[fast] = spectrum[fast] / omega[fast] ** 2
     implied = np.fft.irfft(motion, series.size)
-    return float(np.sqrt(np.mean(implied**2))) < UNSEEN * data.sigma[0]
+    return float(np.sqrt(np.mean(implied**2))) < UNSEEN * data.sigma[DISPLACEMENT]
 
 
 def when(trace: SiteTrace, record: Record, threshold: float = 1.0) -> tuple[tuple[float, float], ...]:

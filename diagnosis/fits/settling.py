@@ -18,7 +18,7 @@ from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import ScreenedEffect
 from diagnosis.fits.sensor_noise import quieter
 from diagnosis.fits.threads import each
-from diagnosis.fits.unexplained import MATERIAL, SIGNIFICANT, gaps, leaves, model_error
+from diagnosis.fits.unexplained import MATERIAL, exceeds, gaps, leaves, model_error
 from diagnosis.fits.worth import changes, idle, is_gap
 from diagnosis.signals.mask import Mask
 from models.registry import Array
@@ -132,19 +132,14 @@ def stands_out(fit: Fit) -> bool:
 def doubtful(fit: Fit) -> Mask:
     """The signals (signals,) whose coloured noise the inputs foresee, or which is loud and comes and goes."""
     least = np.maximum(MATERIAL, model_error(fit))
-    seen = [
-        item.ratio > limit and item.significance > SIGNIFICANT
-        for item, limit in zip(sensor_noise.foreseen(fit), least, strict=True)
-    ]
+    seen = [exceeds(item, limit) for item, limit in zip(sensor_noise.foreseen(fit), least, strict=True)]
     uneven = [item.tails > UNEVEN for item in fit.data.noise]
     return np.array(seen) | (np.array(uneven) & (sensor_noise.loudest(fit) > LOUDEST))
 
 
 def undoubted_noise(fit: Fit) -> Array:
     """Rms (signals,) of the coloured noise of signals that show no gap, beside others that may; 0 for none."""
-    leaving = [
-        item.ratio > MATERIAL and item.significance > SIGNIFICANT for item in gaps(fit, fit.data.group)
-    ]
+    leaving = [exceeds(item, MATERIAL) for item in gaps(fit, fit.data.group)]
     coloured = np.array([item.density is not None for item in fit.data.noise])
     return np.where(coloured & ~doubtful(fit) & ~np.array(leaving), fit.data.white, 0.0)
 

@@ -90,7 +90,12 @@ def leaves(fit: Fit, allowed: Array | None = None) -> bool:
     ]
     if sensor_noise.coloured(fit.data):
         found += zip(sensor_noise.foreseen(fit), least, strict=True)
-    return any(item.ratio > limit and item.significance > SIGNIFICANT for item, limit in found)
+    return any(exceeds(item, limit) for item, limit in found)
+
+
+def exceeds(found: SystematicGap | Foreseen, limit: float) -> bool:
+    """Whether what is systematic in a signal is larger than a limit, over noise, and no chance."""
+    return found.ratio > limit and found.significance > SIGNIFICANT
 
 
 def foresees(fit: Fit, allowed: Array) -> bool:
@@ -107,10 +112,7 @@ def foresees(fit: Fit, allowed: Array) -> bool:
 def is_foreseen(found: list[Foreseen], allowed: Array) -> bool:
     """Whether what inputs say of the residual of any signal is more than is allowed in it (signals,), over σ."""
     least = np.maximum(FORESEEN, allowed)
-    return any(
-        item.ratio > limit and item.significance > SIGNIFICANT
-        for item, limit in zip(found, least, strict=True)
-    )
+    return any(exceeds(item, limit) for item, limit in zip(found, least, strict=True))
 
 
 def resonant(fit: Fit) -> Crosswise | None:
