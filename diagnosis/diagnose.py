@@ -187,7 +187,7 @@ def remarks(
 ) -> list[str]:
     """Sentences on what a recording can show, and on what is doubtful in its readings and verdicts."""
     return [
-        *together(more),
+        *of_several(more),
         *of_plan(record),
         *not_recorded(record),
         *reversed_signs(datas),
@@ -315,7 +315,7 @@ def exchanged(record: Record) -> list[LinkFinding]:
     return link_effects.findings(account, record.plan.test.interval)
 
 
-def together(more: Sequence[Record]) -> list[str]:
+def of_several(more: Sequence[Record]) -> list[str]:
     """A sentence where several recordings were searched at once."""
     names = ", ".join(str(other.run.path) for other in more)
     return [f"The laboratories' causes explain this recording and {names}."] if more else []

@@ -25,9 +25,8 @@ FIRST = 0.02  # of the largest residual, from which on the stop has been met
 INSIDE = (0.97, 0.7)  # of the largest stroke before that, where a stiff and a soft stop may stand
 AFTER = 0.4  # s after first contact that the shortest fit covers
 LONGER = 1.3  # factor from one fit to the next
-BEYOND = (
-    30.0  # times the stroke before that: no motion that meets a stop goes so far, not even an unstable one
-)
+# Times the stroke before that: no motion that meets a stop goes so far, not even an unstable one.
+BEYOND = 30.0
 EVERY = 5  # of so many averaged samples one judges
 
 

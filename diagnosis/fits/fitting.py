@@ -24,9 +24,8 @@ from models.registry import Array
 
 ROUNDS = 4  # fits with the signals' weights renewed in between
 SHORTEST, LONGEST = 6.0, 0.7  # of a beginning: seconds, and share of the test
-MOSTLY = (
-    0.7  # share of what a fit leaves that a beginning must hold, so that the rest of the test teaches little
-)
+# Share of what a fit leaves that a beginning must hold, so that the rest of the test teaches little.
+MOSTLY = 0.7
 BRIEFLY = 0.3  # the same of one over which many starts of a law are compared before
 # Share of what a fit leaves, beyond noise, that must lie on either side of what it sees: with less a fit finds little,
 # or little judges it; and the share with which it finds nothing, or nothing judges it.

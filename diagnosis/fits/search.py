@@ -21,7 +21,7 @@ from diagnosis.recorded.joined import column_of
 MOST = 3  # effects of one part, the bias of a sensor aside: more of them can imitate any residual
 # Effects of one part that leave only noise, each of them needed for that; the share of what is left that each must
 # explain on the way. Of 11 gaps of unknown effects and other formulas none was taken for such a set.
-TOGETHER, STEP_OF_LEFT = 6, 0.3
+MOST_NEEDED, STEP_OF_LEFT = 6, 0.3
 # Systematic residual over noise that such a set is to explain, and the share of it that it may leave. The formula of a
 # law leaves 0.3 where the specimen has another one, and two effects that were not there took 0.308 to 0.296, just below
 # what can be seen. The least effect that counts as visible in a trial is 2. Of a fainter residual beside `MOST` effects
@@ -72,22 +72,22 @@ def at_any_size(data: Data, scales: Scales) -> tuple[Search, Fit | None]:
     fit beside it, which is None where there is a gap.
     """
     bare = settling.settled(fitting.fit(data, {}))
-    found = within(data, bare, scales)
-    if data.part.exact or leaves(found.chosen, model_error(found.chosen)) or tells(found, bare):
+    found = found_from(data, bare, scales)
+    if data.part.exact or leaves(found.chosen, model_error(found.chosen)) or found_enough(found, bare):
         return found, None
     fine = fitting.polished(settling.settled(fitting.fit(data.fine, {}, bare.z)))
     erring = model_error(fine)
     if leaves(fine, erring) or foresees(fine, erring):
-        return within(data.fine, fine, scales), None
+        return found_from(data.fine, fine, scales), None
     return found, fine
 
 
-def tells(found: Search, bare: Fit) -> bool:
+def found_enough(found: Search, bare: Fit) -> bool:
     """Whether effects were found that tell enough: of a larger gap than good solutions differ by, or all of a gap."""
     return bool(found.chosen.names) and (leaves(bare, model_error(bare)) or not worth.is_gap(found.chosen))
 
 
-def within(data: Data, bare: Fit, scales: Scales) -> Search:
+def found_from(data: Data, bare: Fit, scales: Scales) -> Search:
     """What was found in a part, from its fit without effects on."""
     if worth.is_gap(bare) and fitting.one_sided(bare):
         return searched(settling.settled(fitting.fit(data.whole, {})), scales)
@@ -112,16 +112,16 @@ def searched(bare: Fit, scales: Scales) -> Search:
     most = MOST + len(chosen.names) - count(chosen)
     chosen, as_good = trade.traded(bare, chosen, first, scales, most)
     if may_lack(bare, chosen):
-        chosen = together(chosen, scales, beside if chosen is before else None)
+        chosen = with_weaker(chosen, scales, beside if chosen is before else None)
     others = sorted([*candidates.alternatives(chosen, first, scales), *as_good], key=lambda fit: fit.cost)
-    if (more := trade.two_for_one(chosen, others, scales, TOGETHER)) is not chosen:
+    if (more := trade.two_for_one(chosen, others, scales, MOST_NEEDED)) is not chosen:
         chosen, others = more, [chosen, *candidates.alternatives(more, first, scales)]
     chosen, others = trade.on_all(chosen, others)
     found = Search(bare.data, bare, trimmed(chosen), tuple(map(trimmed, others)))
-    found = plainest(believed(likeliest(found)))
+    found = plainest(inside_ranges(likeliest(found)))
     stands = found.chosen
     if set(stands.names) != set(chosen.names) and may_lack(bare, stands):
-        stands = together(stands, scales)  # what an exchanged effect hid
+        stands = with_weaker(stands, scales)  # what an exchanged effect hid
     if (chosen := fewest(stands)) is found.chosen:
         return found
     chosen, others = trade.on_all(chosen, candidates.alternatives(chosen, first, scales))
@@ -193,7 +193,7 @@ def may_lack(bare: Fit, fit: Fit) -> bool:
     return begun and remaining(fit) < worth.LOUD and not of_one_loop(fit)
 
 
-def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fit:
+def with_weaker(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fit:
     """The effects chosen with further ones where all together leave nothing that can be seen; else those chosen.
 
     Beside an effect of a thousand times the noise, one of twenty times the noise explains too little of the whole gap
@@ -204,8 +204,8 @@ def together(chosen: Fit, scales: Scales, beside: list[Fit] | None = None) -> Fi
     faint = left <= FAINT
     if faint and count(chosen) < MOST:
         return chosen
-    share, size = (worth.REST, len(chosen.names) + 1) if faint else (STEP_OF_LEFT, TOGETHER)
-    while wanting(fit) and len(fit.names) < min(size, TOGETHER):
+    share, size = (worth.NEARLY_ALL, len(chosen.names) + 1) if faint else (STEP_OF_LEFT, MOST_NEEDED)
+    while wanting(fit) and len(fit.names) < min(size, MOST_NEEDED):
         further = beside if fit is chosen and beside is not None else candidates.best_laws(fit, scales)
         if not further or excess(further[0]) > (1.0 - share) * excess(fit):
             break
@@ -307,7 +307,7 @@ def likeliest(search: Search) -> Search:
     return in_front(search, best)
 
 
-def believed(search: Search) -> Search:
+def inside_ranges(search: Search) -> Search:
     """The search with effects inside their ranges in front of ones at the end of theirs, if none is seen to leave more.
 
     At the end of its range an effect turns into another one, as pinching without stiffness at the origin into slip.

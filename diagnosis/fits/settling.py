@@ -27,12 +27,10 @@ ROUNDS = 4  # in which a fit and the noise that it leaves are found in turn
 STEPS = 6  # of a fit between two of these
 MOVED = 9.0  # fall of the cost from which on a fit may have more to gain: three standard deviations, squared
 RIVALS, ROUGH = 3, 4  # candidates that are fitted in the place of coloured noise, and steps of their fits
-LOUDEST = (
-    10.0  # noise at its loudest frequency over that at the highest ones: pink noise of a whole test has less
-)
-SMALL = (
-    0.05  # of a reading's rms that may be coloured noise where only the residual beside effects tells of it
-)
+# Noise at its loudest frequency over that at the highest ones: pink noise of a whole test has less.
+LOUDEST = 10.0
+# Of a reading's rms that may be coloured noise where only the residual beside effects tells of it.
+SMALL = 0.05
 UNEVEN = 3.0  # times what the energy of normal noise varies by: such noise comes and goes, as a motion does
 
 

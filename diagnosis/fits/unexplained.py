@@ -27,9 +27,8 @@ MATERIAL = 0.12  # systematic residual over noise below which a gap would intere
 # The same of what follows from the inputs, where nothing larger is left: it is no noise whose level is known badly. Of
 # 75 clean laboratories through loggers and in other code the largest that was sure was 0.075, beside pink noise.
 FORESEEN = 0.085
-SIGNIFICANT = (
-    5.0  # standard deviations from which on it is no chance, with all signals and time scales looked at
-)
+# Standard deviations from which on it is no chance, with all signals and time scales looked at.
+SIGNIFICANT = 5.0
 
 BOTH = 2.0  # solutions with an error of their own: the laboratory's and the replay's
 

@@ -21,15 +21,12 @@ BY_CHANCE = 0.02  # share of laboratories in which Σ z² of a part is larger by
 # between effects that are overlooked and effects that are named without a cause.
 DATA_GAIN = 25.0  # 5 standard deviations squared
 
-# A further effect explains
-REST = 0.85  # this share of what is left,
-TRACE = 2e-4  # and more than this share of the whole gap, which keeps out effects that fit the noise;
-HALF, SHARE = 0.5, 0.03  # or this share of what is left and this of the whole gap;
-LOUD, STEP_OF_REST, STEP_OF_WHOLE = (
-    10.0,
-    0.4,
-    0.01,
-)  # or these, where more than so many times the noise is left
+# What a further effect must explain: shares of what is left, and of the whole gap. The second of the first pair keeps
+# out effects that fit the noise.
+NEARLY_ALL, TRACE = 0.85, 2e-4
+HALF, SHARE = 0.5, 0.03
+# The same far from any noise, where more than LOUD times it is left: a model may well be refined in small steps there.
+LOUD, STEP_OF_REST, STEP_OF_WHOLE = 10.0, 0.4, 0.01
 
 SEEN = 0.3  # trace over noise that an effect must leave: a smaller one is not visible in a plot
 CANCELLED = 4.0  # times the gap that one of several effects may make: beyond it effects undo each other
@@ -136,10 +133,9 @@ def refines(bare: Fit, before: Fit, after: Fit) -> bool:
     """
     left, saved = excess(before), excess(before) - excess(after)
     whole = min(moving(bare), bare.data.energy)
-    # far from any noise a model may well be refined in small steps
     steps = saved > STEP_OF_REST * left and saved > STEP_OF_WHOLE * whole and remaining(before) > LOUD
     return (
         steps
-        or (saved > REST * left and saved > TRACE * whole)
+        or (saved > NEARLY_ALL * left and saved > TRACE * whole)
         or (saved > HALF * left and saved > SHARE * whole)
     )

@@ -13,9 +13,8 @@ ROUNDING = 4.0 * float(np.finfo(np.float64).eps)  # of a value, relative to the 
 COARSE = 1e3  # roundings that a step must exceed
 # Levels from which on they tell of a step: the two gaps between three free floats have no common divisor.
 LEVELS = 3
-SELDOM = (
-    0.2  # of how often the commonest level occurs, up to which one may have come about between two others
-)
+# Of how often the commonest level occurs, up to which one may have come about between two others.
+SELDOM = 0.2
 # Share of equal samples that must be multiples of a step, and how many times too large its first guess may be.
 MOST, TIMES = 0.8, 12
 ALIGNED = 1e-6  # of a step, within which a value counts as a multiple: far more than the rounding of floats

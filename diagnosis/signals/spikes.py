@@ -8,9 +8,8 @@ from scipy import ndimage
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 
-BEYOND = (
-    6.0  # deviations of the neighbourhood; one sample of white normal noise in ten thousand is further away
-)
+# Deviations of the neighbourhood; one sample of white normal noise in ten thousand is further away.
+BEYOND = 6.0
 NEIGHBOURS = 5  # samples whose median a sample is held against
 WIDER = 25  # samples whose median smooth noise is held against
 AS_MUCH = 4.0  # deviations of that: what is smooth has no spikes

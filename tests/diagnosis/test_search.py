@@ -12,7 +12,7 @@ from diagnosis.fits import candidates, evidence, fitting, residuals, screening, 
 from diagnosis.fits import search as searching
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import Search, believed, likeliest, search, together, trimmed
+from diagnosis.fits.search import Search, inside_ranges, likeliest, search, trimmed, with_weaker
 from laboratories.effects import CATALOGUE
 from tests.diagnosis.cases import (
     SECONDS,
@@ -293,8 +293,8 @@ def test_an_effect_that_is_small_beside_another_is_named_where_both_leave_only_n
     data, scales = residuals.prepare(part, found), Scales(found)
     alone = fitting.fit(data, {"damper.offset": effects["damper.offset"]})
     assert not worth.refines(fitting.fit(data, {}), alone, fitting.fit(data, effects))
-    assert set(together(alone, scales).names) == set(effects)
-    assert set(together(fitting.fit(data, effects), scales).names) == set(effects)
+    assert set(with_weaker(alone, scales).names) == set(effects)
+    assert set(with_weaker(fitting.fit(data, effects), scales).names) == set(effects)
 
 
 @pytest.mark.parametrize(("left", "refines"), [(6.0, True), (4e5, False)])
@@ -368,8 +368,8 @@ def test_effects_at_the_end_of_their_ranges_stand_behind_others_that_leave_nothi
         for values in ({}, {"damper.gain": {"factor": most}}, {"damper.viscous": {"factor": 1.4}})
     )
     monkeypatch.setattr("diagnosis.fits.search.remaining", lambda _: left)
-    assert believed(Search(data, bare, end, (other,))).chosen.names == (first,)
-    assert believed(Search(data, bare, other, (end,))).chosen is other
+    assert inside_ranges(Search(data, bare, end, (other,))).chosen.names == (first,)
+    assert inside_ranges(Search(data, bare, other, (end,))).chosen is other
 
 
 def test_a_force_that_stands_still_is_looked_for_far_beyond_what_the_motion_makes(cases: Cases) -> None:

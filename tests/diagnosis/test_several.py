@@ -11,7 +11,7 @@ import pytest
 from diagnosis.fits import candidates, fitting, residuals, trade, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import may_lack, together
+from diagnosis.fits.search import may_lack, with_weaker
 from models.registry import Array
 from tests.diagnosis.cases import Cases, Effects, lab_a
 from tests.diagnosis.test_equivalents import DATA, NOISY
@@ -49,7 +49,7 @@ def test_an_effect_beside_three_is_found_by_the_nominal_parameter_that_stands_in
     data, scales = residuals.prepare(lab_a(whole), whole), Scales(whole)
     three = fitting.fit(data, {name: dict(FOUR[name]) for name in list(FOUR)[:3]})
     assert worth.strained(three)
-    names = set(together(three, scales).names)
+    names = set(with_weaker(three, scales).names)
     assert set(list(FOUR)[:3]) < names
     assert names - set(FOUR) <= {"sensor.column_force.gain", "sensor.column_displacement.gain"}
 
@@ -81,7 +81,7 @@ def test_a_faint_rest_is_not_filled_up_with_effects(
     monkeypatch.setattr("diagnosis.fits.search.excess", lambda fit: 1e3 * left[fit.names] ** 4)
     monkeypatch.setattr(candidates, "best_laws", lambda *_: [two])
     monkeypatch.setattr(candidates, "without", lambda *_: one)
-    assert together(one, None) is (two if taken else one)  # type: ignore[arg-type, comparison-overlap]
+    assert with_weaker(one, None) is (two if taken else one)  # type: ignore[arg-type, comparison-overlap]
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_an_effect_that_came_before_is_exchanged_beside_one_that_it_stood_in_for
     monkeypatch.setattr(candidates, "best_laws", lambda item, _: [wrong] if item is one else [])
     monkeypatch.setattr(candidates, "exchanged", lambda *_: right)
     monkeypatch.setattr(candidates, "without", lambda *_: one)
-    assert together(one, None) is right  # type: ignore[arg-type]
+    assert with_weaker(one, None) is right  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("z", "after", "taken"), [(3.3, 0.4, True), (2.4, 0.4, False), (3.3, 2.9, False)])

@@ -30,9 +30,8 @@ TURNS, EVALUATIONS = 2, 60  # of the simplex with the effects' parameters, each 
 LOGARITHMIC, LINEAR = 0.06, 0.4  # first edges of the simplex, of the logarithm and of a shape over its size
 SURELY = 25.0  # cost by which a law with more free parameters must be better: 5 standard deviations squared
 FARTHEST = 30.0  # times what the best fit leaves: one that leaves more is under no law the right one
-SLIGHT = (
-    0.02  # systematic residual over noise below which one law is as good as another: it can hardly be seen
-)
+# Systematic residual over noise below which one law is as good as another: it can hardly be seen.
+SLIGHT = 0.02
 BETTER = 0.9  # of what is left beyond noise: less of it is worth another law than the first
 
 
