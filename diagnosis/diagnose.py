@@ -236,9 +236,10 @@ def rms_by_signal(verdicts: Sequence[PartVerdict], of: Callable[[Search], Array]
 def machines_first(
     record: Record, verdicts: Sequence[PartVerdict], noisy: Sequence[SensorFinding]
 ) -> tuple[list[PartVerdict], list[SensorFinding]]:
-    """The verdicts and the noise found on sensors, where noise that a machine's motion or an effect makes is none.
+    """The verdicts and the noise found on sensors, without noise that something else makes.
 
-    Nor is what effects leave, where it follows the motion.
+    Noise that a machine's motion or an effect makes is told by the verdict on its part. Noise beside effects that
+    follows the motion is left by these, which then explain in part only.
     """
     signal = {item: record.catalogue[item.effect].signal for item in noisy if item.parameter == "rms"}
     usual = {name: item.usual for item, name in signal.items()}

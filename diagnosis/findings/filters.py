@@ -63,7 +63,7 @@ class LikelyFilter(NamedTuple):
         return self.of.gain(other) > own - max(BEYOND, AS_LIKELY * own)
 
     def spoken_for(self, several: Sequence[LikelyFilter]) -> bool:
-        """Whether all of several that are late less allow it."""
+        """Whether every filter of `several` that delays less allows this one."""
         return all(other.allows(self.channel) for other in several if other.channel.late < self.channel.late)
 
 
@@ -87,9 +87,10 @@ def filtered(record: Record) -> Record:
 
 
 def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> Common:
-    """The filter of forces: that of the forces that the master used, and of the laboratories where none objects.
+    """The filter of forces: of those that the master used, or of the laboratories that agree on one.
 
-    Of `exact` each is such forces by the motion of the building, the likeliest of which count.
+    Each of `exact` is a way to see the forces that the master used, by the motion of the building; the likeliest way
+    counts. Its filter is also that of the laboratories whose forces are about as likely behind it.
     """
     tried = [(low_pass.roughly(one.spectra), one) for one in exact]
     first, own = min(tried, key=lambda item: item[0].surprise, default=(None, None))

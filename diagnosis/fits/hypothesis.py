@@ -149,7 +149,7 @@ class Problem:
         return self.keep(p, self.data.reduced(lay(self.data, p[: self.count], self.values(p))))
 
     def keep(self, p: Array, reduced: Array) -> Array:
-        """Keep the residuals of a place in the stead of the oldest ones, and return them."""
+        """Keep the residuals of a place instead of the oldest ones, and return them."""
         if len(self._kept) >= KEPT:
             del self._kept[next(iter(self._kept))]
         self._kept[p.tobytes()] = reduced

@@ -187,7 +187,8 @@ def count(fit: Fit) -> int:
 def may_lack(bare: Fit, fit: Fit) -> bool:
     """Whether effects may be missing beside those of a fit that explain too little by themselves.
 
-    What leaves more than `LOUD` lacks its largest effects yet. So does what explains less than each further one must.
+    A fit that leaves more than `LOUD` still lacks its largest effects, and so does one that explains less than each
+    further effect must.
     """
     begun = excess(fit) <= (1.0 - STEP_OF_LEFT) * excess(bare)
     return begun and remaining(fit) < worth.LOUD and not of_one_loop(fit)

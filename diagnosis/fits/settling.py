@@ -35,12 +35,12 @@ UNEVEN = 3.0  # times what the energy of normal noise varies by: such noise come
 
 
 def settled(fit: Fit, accepted: Data | None = None) -> Fit:
-    """The fit under the noise that it leaves, which is that of its data.
+    """The fit moved to the best parameters under the noise that it leaves, and with data that have this noise.
 
-    Where much of what it leaves follows from the inputs, the quiet part holds a gap as well as noise: the noise is
-    then taken to be white, of the level of the highest frequencies, or of averaged samples where these are quieter,
-    beside the mains, which no machine follows.
-    `accepted` are the data with the noise beside other effects, or none.
+    Fit and noise follow from each other, and are found in turn. Where much of what the fit leaves follows from the
+    inputs, the quiet part holds a gap as well as noise. The noise is then taken to be white, of the level of the
+    highest frequencies or of averaged samples, whichever is quieter, beside the mains, which no machine follows.
+    `accepted` are data whose noise beside other effects was accepted; louder noise is doubted.
     """
     if fit.data.part.exact:
         return fit
@@ -102,11 +102,12 @@ def all_again(fits: Iterable[Fit], data: Data) -> list[Fit]:
 
 
 def hidden(fit: Fit, accepted: Data | None = None) -> bool:
-    """Whether the noise that a fit is measured by may hold a gap.
+    """Whether the noise that a fit is measured by may hold a gap, in one of four ways.
 
-    The inputs foresee more of it than two good solutions of one model differ by; or something is left beside that
-    noise, and it is far louder at some frequency than at the highest ones, as the noise of no sensor is; or it comes
-    and goes, or what effects leave would be a large share of a reading and is louder than the noise `accepted`.
+    More of it follows from the inputs than two good solutions of one model differ by. It is loud at some frequency and
+    comes and goes. Something is left beside it, and it is far louder at some frequency than at the highest ones, which
+    no sensor's noise is. Or it stands beside effects, is a large share of a reading and louder than the noise
+    `accepted`.
     """
     if fit.names and louder(fit.data, accepted):
         return True

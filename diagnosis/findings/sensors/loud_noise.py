@@ -20,11 +20,10 @@ from models.registry import Array
 
 
 def no_noise(verdict: PartVerdict, usual: Mapping[str, float], scales: Scales) -> PartVerdict | None:
-    """The verdict where what looks like loud noise of readings is none, else None.
+    """The verdict on a part whose loud noise an effect or the motion of its machine makes; None where it is noise.
 
-    `usual` is the rms noise that such readings have otherwise, by signal. What an effect predicts is no noise. Steps of
-    a command shake a machine like noise does, and all its readings show it; the noise of a sensor shows in its own
-    reading alone.
+    `usual` is the rms noise that such readings have otherwise, by signal. Steps of a command shake a machine as noise
+    does, and all its readings show it; the noise of a sensor shows in its own reading alone.
     """
     found, signals = verdict.search, verdict.search.data.part.signals
     if verdict.effects or verdict.joined or not usual.keys() & set(signals):

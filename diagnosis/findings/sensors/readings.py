@@ -104,7 +104,8 @@ def resolutions(record: Record, rounded: Mapping[str, float]) -> dict[str, float
 def held(record: Record, steps: Mapping[str, float]) -> dict[str, float]:
     """Share of samples exactly equal to the one before, by sensor; only of sensors whose noise rules that out.
 
-    It does not of those with `steps`. Of a channel that was interpolated onto the ticks these may not be known.
+    Sensors with `steps` may well repeat a sample. So may a channel that was interpolated onto the ticks, whose steps
+    may not be known.
     """
     found, between = {}, interpolated(record)
     for name in read_by(record):

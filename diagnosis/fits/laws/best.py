@@ -68,9 +68,9 @@ def ending(better: list[Fit], fits: list[Fit]) -> list[Fit]:
 
 
 def under_the_first(fit: Fit) -> Fit:
-    """The fit with its last effect under the first of its laws, begun where a further law has led, if that is as good.
+    """The fit with its last effect under the first of its laws, if that is as good from where a further law has led.
 
-    A further law that is nearly the first one leads past what stopped a fit under this.
+    A fit under the first law may have stopped too early, past which a further law that is nearly the same has led.
     """
     effect, values = last(fit), fit.values[fit.names[-1]]
     if not values.get("law"):
