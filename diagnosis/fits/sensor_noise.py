@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.fitting import Fit
@@ -30,6 +29,7 @@ from diagnosis.signals.noise_model import NoiseModel, Source
 from diagnosis.signals.predictors.ceiling import Crosswise
 from diagnosis.signals.predictors.features import features
 from diagnosis.signals.spikes import spikes
+from diagnosis.signals.systematic import samples_per_sample
 from models.registry import Array
 from models.system import System
 
@@ -348,23 +348,11 @@ def alike(noise: Array, quiet: Mask) -> bool:
         if min(still.size, loud.size) < 8:
             continue
         more = float(np.var(loud)) / max(float(np.var(still)), 1e-300) - 1.0
-        one = 2.0 * repeated(summed([white], size))
+        sums = summed([white], size)
+        one = 2.0 * samples_per_sample(sums - sums.mean())
         if more > SURE * math.sqrt(one / still.size + one / loud.size):
             return False
     return True
-
-
-def repeated(noise: Array) -> float:
-    """How many samples of noise (n,) tell as much of its variance as one of white noise: Σρ² over all lags.
-
-    Source: M. S. Bartlett, Journal of the Royal Statistical Society, Supplement 8 (1946).
-    """
-    apart = noise - noise.mean()
-    reach = noise.size // 4
-    along = signal.correlate(apart, apart, method="fft")[noise.size - 1 : noise.size + reach]
-    if along[0] <= 0.0:
-        return 1.0
-    return float(2.0 * np.sum((along / along[0]) ** 2) - 1.0)
 
 
 def summed(segments: list[Array], size: int) -> Array:

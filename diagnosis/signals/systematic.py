@@ -80,3 +80,11 @@ def correlations(values: Array, reach: int) -> Array:
     """Correlation of a series (n,) with itself at lags from one to `reach`."""
     whole = signal.correlate(values, values, method="fft")[values.size - 1 : values.size + reach]
     return np.asarray(whole[1:] / max(float(whole[0]), 1e-300))
+
+
+def samples_per_sample(values: Array) -> float:
+    """How many samples of a series (n,) tell as much of its variance as one of white noise: 1 + 2·Σρ² over its lags.
+
+    Source: M. S. Bartlett, Journal of the Royal Statistical Society, Supplement 8 (1946).
+    """
+    return 1.0 + 2.0 * float(np.sum(np.square(correlations(values, values.size // 4))))

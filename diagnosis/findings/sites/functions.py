@@ -23,7 +23,7 @@ from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals import colour
 from diagnosis.signals.predictors.ceiling import Crosswise
 from diagnosis.signals.predictors.features import aged, bent, lagged, mixed, plays, scaled, slow, standardised
-from diagnosis.signals.systematic import correlations
+from diagnosis.signals.systematic import samples_per_sample
 from models.registry import Array
 
 # Share of a residual's energy beyond noise that functions must predict: slow noise looks a little like slow functions.
@@ -65,13 +65,12 @@ def nats(own: Array, other: Array) -> float:
     """Nats by which what is left (n,) is likelier noise than another that is (n,), both in σ.
 
     The noise is as loud as the quieter of the two, but at least of one σ: residuals are measured by what a model may
-    err by as well, which must not be credited. Of noise that remembers fewer samples count (Bartlett 1935).
+    err by as well, which must not be credited. Of noise that remembers fewer samples count.
     """
     one, two = float(np.mean(np.square(own))), float(np.mean(np.square(other)))
     likelier = own if one < two else other
-    remembers = 1.0 + 2.0 * float(np.sum(np.square(correlations(likelier, own.size // 4))))
     apart = abs(two - one) / max(1.0, min(one, two))
-    return math.copysign(0.5 * own.size / remembers * math.log1p(apart), two - one)
+    return math.copysign(0.5 * own.size / samples_per_sample(likelier) * math.log1p(apart), two - one)
 
 
 def of_reading(read: Array) -> Iterator[Array]:
