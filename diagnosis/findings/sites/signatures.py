@@ -43,16 +43,6 @@ class Signature(NamedTuple):
     receptance: Spectrum | None = None  # (frequencies,) of the series over that force
 
 
-class Way(NamedTuple):
-    """How the readings of a laboratory follow from one series at a machine."""
-
-    site: str
-    rows: list[Spectrum]  # by signal
-    rare: bool = False
-    motion: int | None = None
-    receptance: Spectrum | None = None
-
-
 def signatures(part: LaboratoryPart, system: System, frequencies: Array) -> list[Signature]:
     """The signatures of the sites of a laboratory, machines first; none of a kind of the user's.
 
@@ -62,19 +52,16 @@ def signatures(part: LaboratoryPart, system: System, frequencies: Array) -> list
     if part.lab.kind.name not in kinds:
         return []
     lab: RecordedLaboratory = part.lab
-    find: Callable[[System, Spectrum], list[Way]] = kinds[lab.kind.name]
+    find: Callable[[System, Spectrum], list[Signature]] = kinds[lab.kind.name]
     s: Spectrum = np.asarray(2j * np.pi * frequencies, dtype=np.complex128)
     recorded = passed(part, frequencies)
     machines = [
-        Signature(
-            lab.site(way.site), np.stack(way.rows, axis=1) * recorded, way.rare, way.motion, way.receptance
-        )
-        for way in find(system, s)
+        one._replace(site=lab.site(one.site), readings=one.readings * recorded) for one in find(system, s)
     ]
-    one = np.eye(recorded.shape[1])
+    alone_rows = np.eye(recorded.shape[1])
     sensors = [
         Signature(lab.site(f"sensor.{name}"), np.broadcast_to(row, recorded.shape).astype(np.complex128))
-        for name, row in zip(lab.kind.channels.names, one, strict=True)
+        for name, row in zip(lab.kind.channels.names, alone_rows, strict=True)
     ]
     return [*machines, *sensors]
 
@@ -82,16 +69,14 @@ def signatures(part: LaboratoryPart, system: System, frequencies: Array) -> list
 def alone(part: LaboratoryPart, system: System, name: str) -> tuple[str, ...]:
     """The sites of what one reading alone shows: the machines that change no other one, then its sensor."""
     place = part.signals.index(name)
-    columns = [(item.site, item.readings[0]) for item in signatures(part, system, np.ones(1))]
+    rows = [(item.site, item.readings[0]) for item in signatures(part, system, np.ones(1))]
     machines = [
-        site
-        for site, row in columns
-        if not is_sensor(site) and row[place] != 0.0 and np.count_nonzero(row) == 1
+        site for site, row in rows if not is_sensor(site) and row[place] != 0.0 and np.count_nonzero(row) == 1
     ]
     return (*machines, part.lab.sensor(name))
 
 
-def of_table(system: System, s: Spectrum) -> list[Way]:
+def of_table(system: System, s: Spectrum) -> list[Signature]:
     """A damper on a table: displacement and acceleration of the table, stroke and force of the damper."""
     damper, none, one = system.plan.damper, np.zeros_like(s), np.ones_like(s)
     inertia = damper.mass * s**2
@@ -99,19 +84,24 @@ def of_table(system: System, s: Spectrum) -> list[Way]:
     moving = inertia + spring
     yields = np.divide(one, moving, out=np.zeros_like(s), where=moving != 0.0)
     return [
-        Way("table", [moving, s**2 * moving, -inertia, -inertia * spring]),
-        Way("table", [none, s**2 * moving, -inertia, -inertia * spring], rare=True),
-        Way("damper", [none, none, one, -inertia], motion=STROKE, receptance=yields),
-        Way("damper", [none, none, one, spring], motion=STROKE, receptance=yields),
+        Signature("table", side_by_side(moving, s**2 * moving, -inertia, -inertia * spring)),
+        Signature("table", side_by_side(none, s**2 * moving, -inertia, -inertia * spring), rare=True),
+        Signature("damper", side_by_side(none, none, one, -inertia), motion=STROKE, receptance=yields),
+        Signature("damper", side_by_side(none, none, one, spring), motion=STROKE, receptance=yields),
     ]
 
 
-def of_column(system: System, s: Spectrum) -> list[Way]:
+def side_by_side(*readings: Spectrum) -> Spectrum:
+    """The readings of a laboratory side by side, (frequencies, signals)."""
+    return np.stack(readings, axis=1)
+
+
+def of_column(system: System, s: Spectrum) -> list[Signature]:
     """A column under an actuator: displacement and force."""
     column, one = system.plan.column, np.ones_like(s)
     return [
-        Way("actuator", [one, column.mass * s**2 + column.damping * s + column.stiffness]),
-        Way("column", [0.0 * one, one], motion=DISPLACEMENT, receptance=one),
+        Signature("actuator", side_by_side(one, column.mass * s**2 + column.damping * s + column.stiffness)),
+        Signature("column", side_by_side(0.0 * one, one), motion=DISPLACEMENT, receptance=one),
     ]
 
 
