@@ -21,12 +21,9 @@ from diagnosis.recorded.record import Record
 from diagnosis.signals import windows
 from models.registry import Array
 
-OWN_MOTION = 0.5  # Hz, above which an acceleration is integrated twice: below, sensor drift would dominate
-UNSEEN = 0.5  # motion over the noise of the displacement sensor below which that sensor cannot show it
 # A window belongs to a trace from this share of the trace's largest window on, but never above the second, so that the
 # strongest window always counts.
 PART_OF_PEAK, BELOW_PEAK = 0.25, 0.9
-DISPLACEMENT, ACCELERATION = 0, 1  # places of the table among the readings of its laboratory
 ASKED = 8  # fits whose sites are kept: a report asks for those of each part several times
 
 
@@ -102,20 +99,12 @@ def sites(verdict: PartVerdict) -> tuple[str, ...]:
 
 @lru_cache(maxsize=ASKED)
 def culprits(fit: Fit) -> tuple[str, ...]:
-    """The sites from which what a fit leaves may come, the likeliest first; several where no reading tells them apart.
-
-    What the accelerometer of a table alone feels may be a rocking of the table, as long as no displacement as large
-    as the one behind it would be seen.
-    """
+    """The sites from which what a fit leaves may come, the likeliest first; several where no reading tells."""
     part = laboratory_of(fit.data.part)
     if part is None:
         alone = fit.data.part
         return (alone.lab.site(alone.name) if isinstance(alone, ColumnAlone) else alone.name,)
-    found = likely_sites(fit) or (part.lab.site(part.lab.kind.sites[0]),)
-    accelerometer = part.lab.site("sensor.table_acceleration")
-    if found[0] == accelerometer and hidden_in_displacement(fit):
-        return tuple(dict.fromkeys((part.lab.site("table"), *found)))
-    return found
+    return likely_sites(fit) or (part.lab.site(part.lab.kind.sites[0]),)
 
 
 def undecided(verdicts: Sequence[PartVerdict]) -> list[str]:
@@ -126,20 +115,6 @@ def undecided(verdicts: Sequence[PartVerdict]) -> list[str]:
         for several in found
         if len(several) > 1
     ]
-
-
-def hidden_in_displacement(fit: Fit) -> bool:
-    """Whether the motion behind an acceleration's residual is too small for the displacement sensor to show."""
-    data = fit.data
-    interval = data.system.plan.test.interval
-    series = data.residual(hypothesis.lay(data, fit.z, fit.values))[:, ACCELERATION]
-    spectrum = np.fft.rfft(series)
-    omega = 2.0 * np.pi * np.fft.rfftfreq(series.size, interval)
-    fast = omega > 2.0 * np.pi * OWN_MOTION
-    motion = np.zeros_like(spectrum)
-    motion[fast] = spectrum[fast] / omega[fast] ** 2
-    implied = np.fft.irfft(motion, series.size)
-    return float(np.sqrt(np.mean(implied**2))) < UNSEEN * data.sigma[DISPLACEMENT]
 
 
 def when(trace: SiteTrace, record: Record, threshold: float = 1.0) -> tuple[tuple[float, float], ...]:

@@ -92,6 +92,18 @@ def test_an_unknown_error_of_a_reading_changes_that_alone(cases: Cases, name: st
     assert where.culprits(fit)[0] == name
 
 
+def test_what_a_quiet_accelerometer_feels_and_no_displacement_would_show_lies_at_the_table(
+    cases: Cases,
+) -> None:
+    part, data, truth = predicted(cases, lab_b)
+    acceleration, noise = part.signals.index("table_acceleration"), data.white.copy()
+    noise[acceleration] *= 0.05
+    fast = np.sin(2.0 * np.pi * 37.0 * 2e-3 * np.arange(len(truth))) * truth[:, 0]
+    truth[:, acceleration] += 10.0 * data.sigma[acceleration] * fast / np.std(fast)
+    part.measured = truth + noise * white(7, *truth.shape)
+    assert where.culprits(fitting.fit(data, {}))[0] == "table"
+
+
 def test_what_moves_the_ground_under_a_table_is_felt_by_all_but_its_displacement(cases: Cases) -> None:
     whole = cases.record(duration=SECONDS)
     part = lab_b(whole)
