@@ -177,3 +177,24 @@ def test_coloured_noise_larger_than_the_steps_of_a_reading_is_taken_for_noise(ca
     model = sensor_noise.modelled(data, system).noise[place]
     assert model.density is not None
     assert model.rms == pytest.approx(0.06, rel=0.2)
+
+
+@pytest.mark.parametrize("far", [True, False])
+def test_a_fit_without_effects_begins_again_from_the_nominal_parameters_of_a_better_one(
+    cases: Cases, far: bool
+) -> None:
+    data = residuals.prepare(lab_a(whole := cases.record(duration=8.0)), whole)
+    best = fitting.fit(data, {})
+    off = fitting.at(data, {}, best.z + 1.0)
+    bare, other = (off, best) if far else (best, off)
+    assert np.array_equal(settling.as_near(bare, other).z, best.z)
+
+
+def test_lines_that_change_by_a_visible_share_of_the_noise_are_found_again(cases: Cases) -> None:
+    data = residuals.prepare(lab_a(whole := cases.record(duration=8.0)), whole)
+    hum = np.zeros_like(data.part.measured)
+    hum[:, 1] = np.sin(2.0 * np.pi * 50.0 * whole.time)
+    loud, faint = (replace(data, lines=share * data.white * hum) for share in (1.0, 0.1))
+    assert settling.shifted(loud, data)
+    assert not settling.shifted(faint, data)
+    assert not settling.shifted(loud, loud)

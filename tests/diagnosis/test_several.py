@@ -10,8 +10,9 @@ import pytest
 
 from diagnosis.fits import candidates, fitting, residuals, trade, worth
 from diagnosis.fits.fitting import Fit, excess
+from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import may_lack, with_weaker
+from diagnosis.fits.search import may_lack, needed, with_weaker
 from models.registry import Array
 from tests.diagnosis.cases import Cases, Effects, lab_a
 from tests.diagnosis.test_equivalents import DATA, NOISY
@@ -133,3 +134,10 @@ def test_hypotheses_that_err_in_withheld_seconds_only_are_told_apart_by_fits_to_
     assert still is other
     better["b",] = replace(better["b",], reduced=NOISY + 0.5)  # further away once more is seen
     assert trade.on_all(chosen, [rival, other]) == (chosen, [rival, other])
+
+
+def test_an_effect_without_which_nothing_is_left_either_is_not_needed(cases: Cases) -> None:
+    late: Values = {"actuator.delay": {"delay": 0.004}}
+    data = residuals.prepare(lab_a(whole := cases.record(late, duration=8.0)), whole)
+    both = fitting.fit(data, late | {"sensor.column_force.gain": {"factor": 1.001}})
+    assert needed(both, worth.SEEN).names == ("actuator.delay",)

@@ -12,11 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.findings import where
+from diagnosis.findings.how_far import may_be_missed
 from diagnosis.findings.sites.shares import shapley
-from diagnosis.findings.verdict import pinned
+from diagnosis.findings.verdict import PartVerdict, pinned
 from diagnosis.findings.where import SiteTrace
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.residuals import Data
+from diagnosis.fits.search import Search
 from diagnosis.recorded.parts import Building, Part
 from diagnosis.recorded.record import NOT_LATE, Record
 from laboratories.effects import CATALOGUE, checked, lay
@@ -153,3 +155,18 @@ def test_a_delay_of_a_logger_at_its_bound_is_no_site(cases: Cases) -> None:
         faint = replace(fit, reduced=np.zeros_like(fit.reduced))  # nothing is left to be seen
         assert pinned(faint) == (name,)
         assert where.unexplained(unknown(faint)).site in (("actuator",) if place == 0 else MACHINES)
+
+
+@pytest.mark.parametrize(("factor", "missed"), [(1.0, True), (1.5, False)])
+def test_samples_that_repeat_make_no_gap_far_larger_than_the_motion_of_an_interval(
+    cases: Cases, factor: float, missed: bool
+) -> None:
+    part = lab_a(whole := cases.record(duration=8.0))
+    place = part.signals.index("column_force")
+    measured = part.measured.copy()
+    measured[:, place] *= factor
+    measured[1::50, place] = measured[::50, place]
+    data = residuals.prepare(part.replaced(measured=measured), whole)
+    bare = fitting.at(data, {}, np.zeros(len(data.part.nuisances)))
+    verdict = PartVerdict(Search(data, bare, bare, ()), "unknown", 1.0, (), ())
+    assert may_be_missed(verdict, "column_force", 0.02) is missed
