@@ -163,12 +163,13 @@ class DamperEffects:
 
 @dataclass(frozen=True)
 class SensorEffects:
-    """Effects on a sensor: `saturated(gain·delayed(lagged(value))) + bias + drift·t + noise`, rounded to the step."""
+    """Effects on a sensor: `saturated(gain·delayed(passed(lagged(value)))) + bias + drift·t + noise`, rounded."""
 
     gain: float = 1.0
     bias: float = 0.0
     drift: float = 0.0  # per s
     lag: float = 0.0  # s
+    high_pass: float = math.inf  # s
     quantization: float = 0.0
     noise: float = 0.0  # rms, in addition to the plan's
     delay: float = 0.0  # s

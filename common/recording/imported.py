@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 IMPORT = "import"  # metadata of an imported recording
 FILTERS = ("butterworth", "bessel")  # the low-pass filters usual before the converters of data loggers
+TINY = 1e-12  # Hz, in place of no frequency, at which a high-pass lets nothing pass
 NODES = (-2, -1, 0, 1)  # ticks of the samples around one, through which a cubic goes
 Samples = NDArray[np.float64]
 
@@ -98,6 +99,7 @@ class ImportedChannel:
     delay: float = 0.0  # s by which its samples are late
     resolution: float = 0.0  # quantization step, 0 where it is not stated
     calibration: float = 0.0  # relative tolerance of its gain
+    high_pass: float = 0.0  # Hz, corner of an amplifier that is coupled to alternating current; 0 for none
     interpolated: bool = False  # whether its samples were interpolated to the ticks
     rate: float = 0.0  # sampling rate of the data, Hz; 0 where times have no meaning
     known: bool = False  # whether it was given as a constant rather than measured
@@ -117,16 +119,19 @@ class ImportedChannel:
         return self.delay + float(below[0] - above[0])
 
     def response(self, frequency: Samples) -> NDArray[np.complex128]:
-        """Frequency response of its filter and delay at `frequency` (Hz)."""
+        """Frequency response of its filters and delay at `frequency` (Hz)."""
         turned = np.exp(-2j * math.pi * self.delay * np.asarray(frequency))
+        if self.high_pass:
+            turned /= 1.0 + self.high_pass / (1j * np.maximum(frequency, TINY))
         return np.asarray(turned if self.filter is None else turned * self.filter.response(frequency))
 
     def through(self, values: Samples, interval: float, more: float = 0.0) -> Samples:
-        """True values (ticks,) as the logger would have recorded them without noise: after its filter and delay.
+        """True values (ticks,) as the logger would have recorded them without noise: after its filters and delay.
 
         They come `more` s later than stated.
         """
-        seen = self.filter.filtered(values, interval) if self.filter else values
+        seen = past_high_pass(values, interval, self.high_pass) if self.high_pass else values
+        seen = self.filter.filtered(seen, interval) if self.filter else seen
         late = self.delay + more
         return seen if late == 0.0 else later(seen, late / interval)
 
@@ -184,6 +189,19 @@ def imported(run: Run) -> ImportedData | None:
         raise InputError(
             f"{run.path} is damaged: its metadata '{IMPORT}' cannot be read; import the data again."
         ) from None
+
+
+def past_high_pass(values: Samples, interval: float, corner: float) -> Samples:
+    """A signal (ticks,) after a high-pass of first order with a corner in Hz, linear between ticks.
+
+    The signal stood at its first value before, which the amplifier had forgotten.
+    """
+    from scipy import signal
+
+    step = 2.0 * math.pi * corner * interval
+    kept = math.exp(-step)
+    change = np.diff(values, prepend=values[0])
+    return np.asarray(signal.lfilter([-math.expm1(-step) / step], [1.0, -kept], change))
 
 
 def later(values: Samples, ticks: float) -> Samples:

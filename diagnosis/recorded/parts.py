@@ -209,7 +209,7 @@ class LaboratoryPart:
         for place, channel in enumerate(self.channels):
             made = system.effects.sensors.get(self.lab.kind.channels.names[place])
             more = made.logger_delay if made else 0.0
-            if channel.filter is not None or channel.delay + more != 0.0:
+            if channel.filter or channel.high_pass or channel.delay + more:
                 found[:, place] = channel.through(found[:, place], self._interval, more)
         if self.freed >= 0:
             found[:, self.freed] += self.begun_elsewhere(self.measured[:, self.freed] - found[:, self.freed])

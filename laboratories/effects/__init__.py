@@ -46,7 +46,8 @@ def shipped() -> Iterator[Effect]:
     """The effects of all files, those on readings for the kinds that ship."""
     for file in FILES:
         if "FAULT" in file:
-            yield from (file["FAULT"].on(name, signal) for name, signal in SIGNALS.items())
+            fault: ReadingFault = file["FAULT"]
+            yield from (fault.on(name, signal) for name, signal in SIGNALS.items() if fault.can_be_on(signal))
         else:
             yield file["EFFECT"]
 
@@ -68,9 +69,8 @@ def of_kind(kind: Kind, plan: Plan) -> dict[str, Effect]:
     found = {name: effect for name, effect in CATALOGUE.items() if effect.site in places}
     found |= {effect.name: effect for effect in kind.effects}
     for name, size in readings_of(kind, plan).items():
-        found |= {
-            effect.name: effect for fault in FAULTS if (effect := fault.on(name, size)).name not in found
-        }
+        here = (fault.on(name, size) for fault in FAULTS if fault.can_be_on(size))
+        found |= {effect.name: effect for effect in here if effect.name not in found}
     return dict(sorted(found.items(), key=lambda item: places.index(item[1].site)))
 
 

@@ -1,8 +1,8 @@
-"""The reading of a value: `saturated(gain·delayed(lagged(value))) + bias + drift·t + noise`, rounded to the step.
+"""The reading of a value: `saturated(gain·delayed(passed(lagged(value)))) + bias + drift·t + noise`, rounded.
 
-The lag is of first order, `τ·ẏ + y = x`; `saturated(x) = x/(1 + |x/L|ⁿ)^(1/n)`, with the level L. Values are linear
-between ticks, for the lag and for a delay by any part of an interval, and zero before the first tick. Without effects a
-reading equals exactly value plus noise.
+Lag and high-pass are of first order, `τ·ẏ + y = x` and `τ·ẏ + y = τ·ẋ`; `saturated(x) = x/(1 + |x/L|ⁿ)^(1/n)`, with
+the level L. Values are linear between ticks, for both and for a delay by any part of an interval, and zero before the
+first tick. Without effects a reading equals exactly value plus noise.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from models.saturation import saturated
 from models.system import SensorEffects
 from models.transfer_systems import first_order
 
-PRESENT, GAIN, BIAS, DRIFT, QUANTUM, FADE, EARLY, LATE, DELAY, LEVEL, SHARPNESS = range(11)
+PRESENT, GAIN, BIAS, DRIFT, QUANTUM, FADE, EARLY, LATE, DELAY, LEVEL, SHARPNESS, FORGETS, PASSES = range(13)
 # from KEPT on a ring of the values kept for a delay; NEWEST is its newest place
-LAGGED, PREVIOUS, NEWEST, KEPT = range(4)
+LAGGED, PREVIOUS, PASSED, NEWEST, KEPT = range(5)
 
 
 class Readings(NamedTuple):
     """One laboratory's sensors with their memory, which `step` updates."""
 
-    params: Array  # (signals, 11)
-    state: Array  # (signals, 3 and as many as the longest delay needs)
+    params: Array  # (signals, 13)
+    state: Array  # (signals, 4 and as many as the longest delay needs)
 
 
 def build(interval: float, names: Sequence[str], sensors: Mapping[str, SensorEffects]) -> Readings:
     """Sensors at rest, one row per name."""
-    params = np.zeros((len(names), 11))
+    params = np.zeros((len(names), 13))
     for place, name in enumerate(names):
         more = sensors.get(name, SensorEffects())
         if more == SensorEffects():
@@ -41,9 +41,20 @@ def build(interval: float, names: Sequence[str], sensors: Mapping[str, SensorEff
         row = first_order.propagators(1.0, more.lag, np.array([interval]))[0]
         steady = (more.gain, more.bias, more.drift, more.quantization)
         level = more.saturation if math.isfinite(more.saturation) else 0.0
-        params[place] = (1.0, *steady, *row, more.delay / interval, level, more.saturation_sharpness)
+        passing = high_pass(interval, more.high_pass)
+        bent = (level, more.saturation_sharpness)
+        params[place] = (1.0, *steady, *row, more.delay / interval, *bent, *passing)
     longest = float(np.max(params[:, DELAY], initial=0.0))
     return Readings(params, np.zeros((len(names), KEPT + (int(longest) + 2 if longest > 0.0 else 0))))
+
+
+def high_pass(interval: float, time_constant: float) -> tuple[float, float]:
+    """Share of a high-pass's output that an interval takes away, and share of a change of its input that it passes.
+
+    For inputs that are linear over the interval; both in s, the time constant infinite without a high-pass.
+    """
+    forgets = -math.expm1(-interval / time_constant)
+    return forgets, forgets * time_constant / interval if forgets else 1.0
 
 
 def levels(names: Sequence[str], nominal: Array, sensors: Mapping[str, SensorEffects]) -> Array:
@@ -81,9 +92,14 @@ def step(sensors: Readings, place: int, value: float, noise: float, t: float) ->
         + params[place, EARLY] * state[place, PREVIOUS]
         + params[place, LATE] * value
     )
+    passed = lagged
+    if params[place, FORGETS] > 0.0:
+        change = params[place, PASSES] * (lagged - state[place, LAGGED])
+        passed = (1.0 - params[place, FORGETS]) * state[place, PASSED] + change
+        state[place, PASSED] = passed
     state[place, LAGGED] = lagged
     state[place, PREVIOUS] = value
-    read = params[place, GAIN] * delayed(sensors, place, lagged)
+    read = params[place, GAIN] * delayed(sensors, place, passed)
     if params[place, LEVEL] > 0.0:
         read = saturated(read, params[place, LEVEL], params[place, SHARPNESS])
     result = read + params[place, BIAS] + params[place, DRIFT] * t + noise

@@ -70,6 +70,7 @@ class SignalSource:
     offset: float = key("offset", default=0.0)
     unit: str = key("unit of the column, instead of a scale", default="")
     delay: float = key("time by which the logger recorded it too late", default=0.0, unit="s")
+    high_pass: float = key("corner of its amplifier's high-pass", default=0.0, least=0.0, unit="Hz")
     calibration: float = key("relative tolerance of its gain", default=0.0, least=0.0, most=1.0)
     resolution: float = field(default=0.0, metadata=key("step of the readings", default=0.0).metadata)
     filter: LoggerFilter | None = field(default=None, metadata=key("low-pass filter", default=0.0).metadata)

@@ -164,6 +164,7 @@ def channel(source: SignalSource, row: Signal, rate: float, *, between: bool) ->
         source.delay,
         source.resolution,
         source.calibration,
+        source.high_pass,
         interpolated=between and not counted,
         rate=rate,
     )

@@ -102,6 +102,15 @@ def test_a_prediction_passes_through_the_stated_filter_and_delay() -> None:
     assert NOTHING_STATED.through(ramp, 0.002) is ramp
 
 
+def test_a_stated_high_pass_halves_the_power_at_its_corner_and_forgets_where_a_signal_stood() -> None:
+    channel, interval = ImportedChannel(high_pass=0.5), 1e-3
+    t = interval * np.arange(20_000)
+    seen = channel.through(3.0 + np.sin(math.pi * t), interval)[10_000:]
+    turned = channel.response(np.array([0.5]))[0]
+    assert turned == pytest.approx(0.5 + 0.5j)
+    assert seen == pytest.approx((turned * np.exp(1j * math.pi * t[10_000:])).imag, abs=1e-5)
+
+
 def test_a_channels_lateness_is_its_delay_plus_its_filters_delay_of_slow_motion() -> None:
     passed = LoggerFilter("butterworth", 2, 50.0)
     assert ImportedChannel(delay=0.002).late == pytest.approx(0.002)

@@ -13,7 +13,6 @@ from scipy import signal
 from common.recording.imported import ImportedChannel
 from diagnosis.findings import where
 from diagnosis.findings.certainty.other_causes import other_causes
-from diagnosis.findings.sensors.leak import leaked, leaks
 from diagnosis.findings.sensors.own_reading import gives_energy
 from diagnosis.findings.sites import functions, likely
 from diagnosis.findings.sites.likely import APART, likely_sites, ranked
@@ -288,49 +287,6 @@ def test_several_effects_with_which_a_column_gives_energy_are_said_together(case
     effects = {"column.stiffness": {"factor": 0.9}, "column.slip": {"gap": 1e-4, "law": 2.0}}
     fit = fitting.at(data, effects, np.zeros(len(data.part.nuisances)))
     assert gives_energy(fit) == "column.stiffness and column.slip"
-
-
-def with_a_leak(whole: Record, constant: float) -> Data:
-    """The column's laboratory with a load cell whose charge leaks with a time constant, s."""
-    part = lab_a(whole)
-    force = part.signals.index("column_force")
-    said = part.predict(whole.systems[part.role])[:, force]
-    measured = part.measured.copy()
-    measured[:, force] += leaked(said, whole.plan.test.interval, constant) - said
-    return residuals.prepare(part.replaced(measured=measured), whole)
-
-
-def viscous(data: Data) -> Search:
-    """A search that found a dashpot at the column, which nominal parameters stand beside."""
-    dashpot = fitting.fit(data, {"column.viscous": {"coefficient": 1e3}})
-    return Search(data, fitting.fit(data, {}), dashpot, ())
-
-
-def test_a_leak_of_a_load_cell_is_said_beside_the_dashpot_that_it_looks_like(cases: Cases) -> None:
-    found = viscous(with_a_leak(cases.record(duration=SECONDS), 20.0))
-    assert leaks(found.chosen) == "column.viscous"
-    assert "sensor.column_force" in next(other_causes(judge(found).search))
-
-
-def test_a_dashpot_of_a_column_is_no_leak(cases: Cases) -> None:
-    whole = cases.record({"column.viscous": {"coefficient": 2e4}}, duration=SECONDS)
-    found = viscous(residuals.prepare(lab_a(whole), whole))
-    assert leaks(found.chosen) == ""
-    assert not any(other_causes(found))
-
-
-def test_an_effect_that_explains_nothing_is_no_leak(cases: Cases) -> None:
-    found = viscous(residuals.prepare(lab_a(cases.record(duration=SECONDS)), cases.record(duration=SECONDS)))
-    assert leaks(found.chosen) == ""
-
-
-def test_a_leak_passes_what_is_fast_and_nothing_that_stands() -> None:
-    interval, constant = 1e-3, 2.0
-    time = np.arange(40000) * interval
-    assert np.abs(leaked(np.ones(time.size), interval, constant)[-1]) < 1e-6
-    omega = 1.0 / constant
-    read = leaked(np.sin(omega * time), interval, constant)[20000:]  # of 1/(1 − i): half the power, 45° early
-    assert read == pytest.approx(np.sin(omega * time + np.pi / 4.0)[20000:] / np.sqrt(2.0), abs=2e-3)
 
 
 def test_a_sensor_that_is_likelier_than_its_machine_does_not_come_before_another_one(

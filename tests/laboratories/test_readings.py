@@ -99,6 +99,23 @@ def test_a_sensors_lag_solves_its_equation_before_gain_and_bias_apply() -> None:
     assert np.allclose(got, 1.1 * exact + 0.3, atol=1e-7)
 
 
+@given(tau=st.floats(0.05, 100.0))
+@settings(max_examples=30)
+def test_a_high_pass_forgets_a_ramped_step_by_the_closed_form(tau: float) -> None:
+    """The value ramps from 0 at tick 0 to 1 at tick 1 and stays."""
+    got = read(np.concatenate([[0.0], np.ones(100)]), SensorEffects(high_pass=tau))
+    passed = -tau / DT * math.expm1(-DT / tau)
+    assert got[0] == 0.0
+    assert np.allclose(got[1:], passed * np.exp(-DT / tau * np.arange(100)), rtol=1e-12, atol=1e-12)
+
+
+def test_a_high_pass_halves_the_power_at_its_corner_and_is_early_there() -> None:
+    tau = 2.0
+    t = DT * np.arange(20000)
+    got = read(np.sin(t / tau), SensorEffects(high_pass=tau))[10000:]
+    assert got == pytest.approx(np.sin(t / tau + np.pi / 4.0)[10000:] / np.sqrt(2.0), abs=2e-3)
+
+
 @given(delay=st.floats(1e-5, 0.2), start=st.floats(-5.0, 5.0), interval=st.sampled_from([DT, 1.0 / 4096.0]))
 @settings(max_examples=60)
 def test_a_delayed_reading_is_interpolated_linearly_between_earlier_values(

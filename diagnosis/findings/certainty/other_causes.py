@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from diagnosis.findings.sensors.leak import cell, leaks
 from diagnosis.findings.sensors.one_motion import one_place
 from diagnosis.findings.sensors.own_reading import errors, gives_energy, of_column
 from diagnosis.fits import hypothesis
@@ -55,11 +54,6 @@ def other_causes(search: Search) -> Iterator[str]:
         yield (
             f"The offsets of {described(fit)} follow from one another as where a machine stands elsewhere, such as "
             "behind a valve that opens later on one side: these signals cannot tell them apart."
-        )
-    if name := leaks(fit):
-        yield (
-            f"A leak of the charge of {cell(fit)} turns the phase of the force as {name} does: these signals cannot "
-            "tell them apart."
         )
 
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from diagnosis.findings.certainty.other_causes import EITHER, small, swings
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.sensors.leak import leaks
 from diagnosis.findings.sites.likely import TRUE_LEAVES
 from diagnosis.findings.verdict import UNNAMED, PartVerdict
 from diagnosis.fits import hypothesis, worth
@@ -64,7 +63,6 @@ def trusted(
         or without_rest(item.search.chosen)
         or small(item.search)
         or swings(item.searched)
-        or leaks(item.search.chosen)
         or item.own is not None
         for item in left
     )

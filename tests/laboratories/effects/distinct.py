@@ -10,9 +10,11 @@ from laboratories.effects.reading import SIGNALS
 def _distinct() -> dict[str, Effect]:
     """All physical effects, and each kind of falsified reading on one signal, a different one for each kind."""
     physics = {name: effect for name, effect in CATALOGUE.items() if not effect.signal}
-    signals = list(SIGNALS)
     faults = dict.fromkeys(effect.fault for effect in CATALOGUE.values() if effect.signal)
-    chosen = [f"sensor.{signals[place % len(signals)]}.{fault}" for place, fault in enumerate(faults)]
+    chosen = []
+    for place, fault in enumerate(faults):
+        having = [signal for signal in SIGNALS if f"sensor.{signal}.{fault}" in CATALOGUE]
+        chosen.append(f"sensor.{having[place % len(having)]}.{fault}")
     return physics | {name: CATALOGUE[name] for name in chosen}
 
 

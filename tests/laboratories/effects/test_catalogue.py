@@ -75,7 +75,7 @@ ROWS = {  # parameters and their units, as users write them in a reality
     "damper.stroke_stop": {"stroke": "m", "stiffness": "N/m"},
     "damper.offset": {"force": "N"},
 }
-FAULTS = ("gain", "bias", "drift", "lag", "delay", "quantization", "noise", "saturation")
+FAULTS = ("gain", "bias", "drift", "lag", "high_pass", "delay", "quantization", "noise", "saturation")
 for signal, unit in SIGNALS.items():
     ROWS |= {
         f"sensor.{signal}.gain": {"factor": ""},
@@ -87,6 +87,8 @@ for signal, unit in SIGNALS.items():
         f"sensor.{signal}.noise": {"rms": unit},
         f"sensor.{signal}.saturation": {"limit": unit, "sharpness": ""},
     }
+    if unit != "m":
+        ROWS[f"sensor.{signal}.high_pass"] = {"time_constant": "s"}
 EACH = pytest.mark.parametrize("effect", DISTINCT.values(), ids=list(DISTINCT))
 
 

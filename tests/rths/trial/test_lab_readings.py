@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import bilinear, lfilter
 
 from tests.rths.trial.played_labs import (
     CLEAN,
@@ -54,6 +55,20 @@ def test_a_lag_acts_as_a_delay_at_low_frequency() -> None:
         late = np.interp(TIMES - 0.008, TIMES, clean)
         assert near(found["column_displacement"][50:], late[50:], 2e-3), formula
         assert not near(found["column_displacement"], clean, 5e-3)
+
+
+def test_a_high_pass_passes_what_is_fast_and_forgets_what_stands() -> None:
+    constant = 0.5
+    for signal, player in (
+        ("column_force", play_a),
+        ("table_acceleration", play_b),
+        ("damper_force", play_b),
+    ):
+        clean = CLEAN[signal]
+        found = player(effect(f"sensor.{signal}.high_pass", time_constant=constant))[signal]
+        numerator, denominator = bilinear([constant, 0.0], [constant, 1.0], 1.0 / DT)
+        assert near(found, lfilter(numerator, denominator, clean), 1e-6)
+        assert not near(found, clean, 1e-3)
 
 
 def test_readings_have_crosstalk_and_missing_samples() -> None:

@@ -60,6 +60,7 @@ PLAIN: tuple[str, ...] = (
         for signal in SIGNALS
         for kind in ("gain", "bias", "drift", "quantization", "noise")
     ),
+    *(f"sensor.{signal}.high_pass" for signal in ("column_force", "table_acceleration", "damper_force")),
 )
 """Effects of the catalogue that these laboratories know in the textbook's formula, "plain"."""
 

@@ -1,4 +1,4 @@
-"""The readings of a laboratory: `gain·value`, saturated, plus bias, drift and noise; held, rounded.
+"""The readings of a laboratory: `gain·value` past a high-pass, saturated, plus bias, drift and noise; held, rounded.
 
 Noise is white, from `default_rng(seed)`; lost samples are drawn from another generator.
 """
@@ -31,6 +31,7 @@ def true_values(names: Sequence[str], levels: Mapping[str, float]) -> Values:
             "missing": 0.0,
             "lag": 0.0,
             "order": 0.0,
+            "forgetting": 0.0,
             "crosstalk": 0.0,
         }
         values |= {f"{name}.{key}": value for key, value in perfect.items()}
@@ -55,6 +56,11 @@ def drift(values: Values, *, signal: str, rate: float) -> None:
 def lag(values: Values, *, signal: str, time_constant: float) -> None:
     """Low-pass filter that delays slow signals by the time constant."""
     values[f"{signal}.lag"] = time_constant
+
+
+def high_pass(values: Values, *, signal: str, time_constant: float) -> None:
+    """High-pass filter of first order that forgets a constant value in the time constant."""
+    values[f"{signal}.forgetting"] = 1.0 / time_constant
 
 
 def quantization(values: Values, *, signal: str, step: float) -> None:
@@ -82,7 +88,7 @@ def crosstalk(values: Values, *, signal: str, coefficient: float) -> None:
     values[f"{signal}.crosstalk"] = coefficient
 
 
-FALSIFIED: tuple[Callable[..., None], ...] = (gain, bias, drift, quantization, noise)
+FALSIFIED: tuple[Callable[..., None], ...] = (gain, bias, drift, high_pass, quantization, noise)
 OUTSIDE: tuple[Callable[..., None], ...] = (missing, crosstalk)
 
 
@@ -112,12 +118,15 @@ class TrueSensor:
 
     values: Values
     generator: np.random.Generator
+    interval: float  # s
     last: float = 0.0
+    before: float = 0.0  # the value a tick ago, and what the high-pass made of it
+    passed: float = 0.0
 
     def read(self, value: float, leak: float, error: float, t: float) -> float:
         """Reading of a true value at `t` s; `leak` is the signal that may leak into it."""
         v = self.values
-        result = v["gain"] * (value + v["crosstalk"] * leak)
+        result = v["gain"] * self.past_high_pass(value + v["crosstalk"] * leak)
         if v["saturation"] > 0.0:
             result = blunted(result, v["saturation"], v["sharpness"])
         result += v["bias"] + v["drift"] * t + error
@@ -128,13 +137,21 @@ class TrueSensor:
         self.last = result
         return result
 
+    def past_high_pass(self, value: float) -> float:
+        """What a high-pass lets pass of a value, by the trapezoidal rule."""
+        share = 0.5 * self.interval * self.values["forgetting"]
+        change = value - self.before
+        self.before, self.passed = value, ((1.0 - share) * self.passed + change) / (1.0 + share)
+        return value if share == 0.0 else self.passed
+
 
 class TrueSensors:
     """The sensors of a laboratory."""
 
     def __init__(self, names: Sequence[str], values: Values, interval: float, seed: int) -> None:
         own = [{key: values[f"{name}.{key}"] for key in keys(name, values)} for name in names]
-        self._sensors = [TrueSensor(v, np.random.default_rng([seed, 1 + i])) for i, v in enumerate(own)]
+        generators = [np.random.default_rng([seed, 1 + place]) for place in range(len(own))]
+        self._sensors = [TrueSensor(v, generators[place], interval) for place, v in enumerate(own)]
         self._strange = readings.strange(names, values, interval, seed)
         self._changed = any(v != {**perfect(), "noise": v["noise"]} for v in own)
         self._levels = np.array([v["noise"] for v in own])

@@ -19,6 +19,10 @@ import math
 from laboratories.effects.effect import Law, Parameter
 from laboratories.effects.laws import sets, which_law
 
+# Hz: of liquid in a tank; frequencies from which a search starts are a sixth apart, as the peak and the notch of a
+# specimen are a few per cent wide
+SLOW = (1.7, 1.4, 1.2, 1.0, 0.84, 0.7, 0.6, 0.5)
+
 EFFECT = sets(
     "table",
     "second_mass",
@@ -29,8 +33,7 @@ EFFECT = sets(
             null=math.inf,
             least=0.3,
             most=100.0,
-            # a sixth apart: the peak and the notch of a specimen are a few per cent wide
-            sizes=(12.0, 10.0, 8.4, 7.0, 5.9, 4.9, 4.0, 3.4, 2.8, 2.4, 2.0),
+            sizes=(12.0, 10.0, 8.4, 7.0, 5.9, 4.9, 4.0, 3.4, 2.8, 2.4, 2.0, *SLOW),
             says="at which it swings on a platform that stands",
         ),
         "second_share": Parameter(

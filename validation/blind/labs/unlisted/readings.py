@@ -37,7 +37,10 @@ EFFECTS = {
         ("sensor.column_force.drift",),
     ),
     "x.sensor.column_force.charge": Unlisted(
-        CHARGE, "a piezoelectric cell's charge leaks: a high-pass of first order", {"rate": (0.02, 1.0)}
+        CHARGE,
+        "a piezoelectric cell's charge leaks: a high-pass of first order",
+        {"rate": (0.02, 1.0)},
+        ("sensor.column_force.high_pass",),
     ),
     "x.sensor.table_displacement.clock": Unlisted(
         CLOCK,
