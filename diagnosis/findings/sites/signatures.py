@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.plan.kinds import COLUMN, TABLE
-from diagnosis.recorded.joined import laboratory_of as laboratory_of  # noqa: PLC0414 - for the module on leaks
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.parts import LaboratoryPart
 from laboratories.effects.sites import is_sensor
