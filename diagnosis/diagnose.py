@@ -41,6 +41,7 @@ from diagnosis.recorded.link import effects as link_effects
 from diagnosis.recorded.link import exchange
 from diagnosis.recorded.link.exchange import LinkFinding
 from diagnosis.recorded.logged_building import LoggedBuilding, logged
+from diagnosis.recorded.missing_rows import unjudged
 from diagnosis.recorded.parts import Building, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from models.registry import Array
@@ -95,7 +96,7 @@ def diagnose(
 
 def put_right(record: Record) -> Record:
     """A record on the clock of its commands, with what its logger did to its readings and its map does not state."""
-    return filters.filtered(logger.clocked(record))
+    return filters.filtered(logger.clocked(logger.whole(record)))
 
 
 def among(record: Record, systems: Mapping[str, System]) -> Record:
@@ -190,6 +191,7 @@ def remarks(
         *of_several(more),
         *of_plan(record),
         *not_recorded(record),
+        *unjudged([data.part for data in datas], record),
         *reversed_signs(datas),
         *repeating(held),
         *outliers.told(verdicts),

@@ -8,7 +8,7 @@ system follows. Its measurements go back to the master, and one of the measured 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -180,12 +180,14 @@ class Kind(ABC):
         table, _, key = name.partition(".")
         return system.scaled(table, key, factor)
 
-    def between_ticks(self, system: System, drive: Array) -> Array | float:
+    def between_ticks(self, system: System, drive: Array, places: Sequence[float | None]) -> Array | float:
         """Means of the readings around each tick, less those of straight lines between ticks, (ticks, channels).
+
+        Of a channel with a place, from 0 at a tick to 1 at the next one, it is what the reading itself has there.
 
         Zero where readings are straight enough. `drive` (ticks, 2) holds the transfer system's command (m), in straight
         lines between ticks, and a motor's (N), held between them. A logger's filter, which averages over several ticks,
-        shows these means.
+        shows these means, and a delay by a part of an interval shows a place.
         """
         return 0.0
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -78,12 +79,55 @@ def filtered(record: Record) -> Record:
     """An imported record with the filters and delays of its logger that its map does not state."""
     if record.stated is None or record.static or record.ticks < LEAST_TICKS:
         return record
-    parts = parts_of(record)
-    labs = [part for part in parts if isinstance(part, LaboratoryPart) and part.free]
+    record = in_time(record)
+    parts, labs = parts_of(record), unstated(record)
     forces = of_forces(of_laboratories(record, labs, force=True), of_building(record, parts))
     others = in_common(of_laboratories(record, labs, force=False), forces.channel)
     late = Late(Delay(forces.channel.delay), Delay(others.channel.delay))
     return replace(record, passed=by_channel(forces, others), late=late)
+
+
+def unstated(record: Record) -> list[LaboratoryPart]:
+    """The laboratories of whose logger the import map states neither a filter nor a delay."""
+    return [part for part in parts_of(record) if isinstance(part, LaboratoryPart) and part.free]
+
+
+def in_time(record: Record) -> Record:
+    """The record with its readings later where those of all laboratories stand before their time alike.
+
+    So does a mean over a row's time that bears the time of its beginning, or a reading in the row of the command that
+    follows it. No machine moves before its command, and one that is faster than planned is so by itself.
+    """
+    early = before_time(of_laboratories(record, unstated(record)), record.plan.test.interval)
+    return record.put_right(0.0, early) if early > 0.0 else record
+
+
+def earlier(early: float) -> ImportedChannel:
+    """A channel that is early, s."""
+    return ImportedChannel(delay=-early)
+
+
+def before_time(labs: Sequence[AlikeReadings], most: float) -> float:
+    """By how much readings of several laboratories are early alike, s, `most` at most; 0 where they are not.
+
+    The laboratory decides that knows it best, unless it is less likely in one that is early less: a fault may make
+    readings earlier still.
+    """
+    found = [
+        (low_pass.closest(partial(low_pass.surprise, one.spectra), earlier, 0.0, most)[0], one)
+        for one in labs
+    ]
+    sure = [
+        LikelyFilter(channel, gain, one) for channel, one in found if (gain := one.gain(channel)) > BEYOND
+    ]
+    if len(sure) < 2:
+        return 0.0
+    chosen = next(
+        one
+        for one in sorted(sure, key=lambda item: -item.gain)
+        if all(other.allows(one.channel) for other in sure if other.channel.delay > one.channel.delay)
+    )
+    return -passed(labs, chosen.channel).channel.delay
 
 
 def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> Common:
@@ -160,18 +204,23 @@ def tuned(several: Sequence[AlikeReadings], common: LoggerFilter) -> LoggerFilte
     return best.filter if best.filter and near and least < said(ImportedChannel(common)) - BEYOND else common
 
 
-def of_laboratories(record: Record, labs: Sequence[LaboratoryPart], *, force: bool) -> list[AlikeReadings]:
-    """Forces, or else the other readings, of each laboratory that has any."""
+def of_laboratories(
+    record: Record, labs: Sequence[LaboratoryPart], *, force: bool | None = None
+) -> list[AlikeReadings]:
+    """Forces, or else the other readings, of each laboratory that has any; all readings where neither is asked for."""
     return [one for part in labs if (one := of_laboratory(record, part, force=force))]
 
 
-def of_laboratory(record: Record, part: LaboratoryPart, *, force: bool) -> AlikeReadings | None:
-    """Forces, or else the other readings, of a laboratory; None where none was recorded."""
+def of_laboratory(record: Record, part: LaboratoryPart, *, force: bool | None) -> AlikeReadings | None:
+    """Forces, or else the other readings, or all of a laboratory; None where none was recorded."""
     rows = zip(part.signals, part.lab.kind.channels.names, np.ptp(part.measured, axis=0), strict=True)
     there = {
         place: name
         for place, (signal, name, span) in enumerate(rows)
-        if (record.unit(signal) == "N") == force and record.has(signal) and span > 0.0 and place != part.freed
+        if force in (None, record.unit(signal) == "N")
+        and record.has(signal)
+        and span > 0.0
+        and place != part.freed
     }
     if not there:
         return None

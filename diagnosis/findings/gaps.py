@@ -50,7 +50,9 @@ class RecordingGaps:
         names = tuple(name for name in record.responses if record.has(name))
         self.loop: RecordedLoop | None = None
         if record.simulable and record.has(*record.targets) and names and record.ground is not None:
-            exchange = exchange_of(record.run, record.ticks) if found.link else None
+            exchange = (
+                exchange_of(record.run, record.ticks, record.plan.test.interval) if found.link else None
+            )
             self.loop = RecordedLoop(record, record.ground, exchange, names)
         own = record is found.record
         whole = [verdict.search.data.part for verdict in found.verdicts] if own else parts_of(record)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.nuisances import ALIKE, LATE
 from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, NOT_LATE, Delay, Late, Record
-from diagnosis.signals import clock
+from diagnosis.signals import clock, edges
 
 BLURRED = 0.1  # of a reading's noise, from which on what an interpolation misses may be told from it
 TOLD = 4e-3  # of a reading's gain: the report shows two digits, and less is no matter for a test
@@ -77,6 +78,21 @@ def by_building(verdict: PartVerdict) -> Delay | None:
     return part.late(fit.z, FOREIGN * np.sqrt(np.diag(covariance(fit))[: fit.z.size]))
 
 
+def whole(record: Record) -> Record:
+    """An imported record without the first and last ticks of readings that a resampling filter spoilt."""
+    if record.stated is None or record.static:
+        return record
+    present = dict(record.present)
+    for part in parts_of(record):
+        if isinstance(part, LaboratoryPart):
+            residual = part.measured - part.predict(record.systems[part.role])
+            for name, there, column in zip(part.signals, part.present.T, residual.T, strict=True):
+                if there.all() and (bad := edges.spoilt(column)).any():
+                    present[name] = present[name] & ~bad
+    spoilt = tuple(name for name, there in present.items() if there is not record.present[name])
+    return replace(record, present=present, edges=spoilt) if spoilt else record
+
+
 def clocked(record: Record) -> Record:
     """An imported record with its readings on the clock of the commands.
 
@@ -110,7 +126,17 @@ def rates(lab: LaboratoryPart, fit: Fit) -> list[clock.Rate]:
 
 def remarks(found: Diagnosis) -> list[str]:
     """Sentences on what the logger of an import did to readings: filters, delays, a fast or slow clock, gains."""
-    return [*passed(found), *timed(found), *gained(found)]
+    return [*passed(found), *timed(found), *gained(found), *bent(found)]
+
+
+def bent(found: Diagnosis) -> list[str]:
+    """A sentence where the ends of readings are left out."""
+    if not found.record.edges:
+        return []
+    return [
+        f"The first or last ticks of {', '.join(found.record.edges)} bend as at the ends of a filter that resampled, "
+        "and are left out."
+    ]
 
 
 def passed(found: Diagnosis) -> list[str]:
@@ -153,6 +179,11 @@ def timed(found: Diagnosis) -> list[str]:
         said.append(
             f"The clock of the readings is {'fast' if fast > 0.0 else 'slow'} by {1e6 * abs(fast):.2g} ppm against "
             "that of the commands: the readings were put onto the clock of the commands."
+        )
+    if found.record.early > 0.0:
+        said.append(
+            f"The readings of all laboratories stand {1e3 * found.record.early:.2g} ms before their time, as means do "
+            "that bear the time at which they begin, or readings in the row of the next command: they were put right."
         )
     late = {names: delay for names, delay in least_late(found).items() if delay >= ALIKE}
     if len(late) > 1:

@@ -55,7 +55,7 @@ def with_laws_that_hold(
         return found, None, ()
     gap = on_others(found, validation) or on_itself(found)
     sites = tuple(law.site for law in found.learned)
-    if gap.learned > WORSE * gap.named:
+    if not gap.learned <= WORSE * gap.named:  # nor one with which the simulation diverges
         text = f"The law learned at {', '.join(sites)} does not hold on data not used for it and is left out."
         return replace(found, learned=()), None, (text,)
     closed = closed_share(gap.before, gap.learned, gap.floor)

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 
-from diagnosis.recorded.parts import MODEL_ERROR, LaboratoryPart
+from diagnosis.recorded.parts import MODEL_ERROR, LaboratoryPart, Part
 from diagnosis.recorded.record import Record
+from diagnosis.signals.mask import Mask
 from models.registry import Array
+
+LEAST = 0.5  # of the ticks, at which a reading must count for its noise to be known
 
 
 def with_known_commands(part: LaboratoryPart, record: Record) -> LaboratoryPart:
     """The part with its readings missing where they depend on commands that are not known.
 
     Straight lines stand where rows are missing. The commands are moved there by half a wave of their rms, and a reading
-    counts again where the laboratory of the plan has forgotten it: to what two good solutions of one model differ by.
+    counts again once the laboratory of the plan has forgotten it, to what two good solutions of one model differ by:
+    not where a motion that it still swings with passes zero.
     """
     gaps = record.stated.gaps if record.stated else ()
     if not gaps:
@@ -23,7 +31,39 @@ def with_known_commands(part: LaboratoryPart, record: Record) -> LaboratoryPart:
     moved = {name: values + np.std(values) * wave for name, values in part.inputs.items()}
     system = record.systems[part.role]
     change = np.abs(part.replaced(inputs=moved).predict(system) - part.predict(system))
-    return part.replaced(present=part.present & (change <= MODEL_ERROR * part.level))
+    known = [
+        remembered(t, [begin for begin, _ in gaps], one) for one in (change > MODEL_ERROR * part.level).T
+    ]
+    present = part.present & ~np.stack(known, axis=1)
+    present[:, present.mean(axis=0) < LEAST] = False
+    return part.replaced(present=present)
+
+
+def unjudged(parts: Sequence[Part], record: Record) -> list[str]:
+    """A sentence on readings that count nowhere, as their laboratory remembers a gap for too long."""
+    names = [
+        name
+        for part in parts
+        if isinstance(part, LaboratoryPart)
+        for name, there in zip(part.signals, part.present.T, strict=True)
+        if record.has(name) and not there.any()
+    ]
+    if not names:
+        return []
+    return [
+        f"{', '.join(names)}: their laboratory remembers commands that the rows missing held for most of the test, so "
+        "that they are not judged. Import the time before or behind the gap by itself (start, stop)."
+    ]
+
+
+def remembered(t: Array, begins: Sequence[float], changed: Mask) -> Mask:
+    """From where each gap begins to the last tick (ticks,) before the next one at which it has `changed` a reading."""
+    result = np.zeros(t.size, dtype=bool)
+    for begin, end in pairwise([*begins, math.inf]):
+        here = np.flatnonzero(changed & (t > begin) & (t <= end))
+        if here.size:
+            result[here[0] : here[-1] + 1] = True
+    return result
 
 
 def half_wave(t: Array, begin: float, end: float) -> Array:

@@ -13,6 +13,7 @@ from common.plan.plan import Plan
 from common.recording.imported import NOTHING_STATED, ImportedChannel, ImportedData
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.record import Late, Record
+from models.registry import Array
 from models.system import System
 
 # Standard deviations within which a logger's channels are expected. LATE: a filter of 40 Hz, usual before sampling at
@@ -163,6 +164,34 @@ def channels(stated: ImportedData | None, lab: RecordedLaboratory) -> tuple[Impo
     if stated is None:
         return (NOTHING_STATED,) * len(lab.measured)
     return tuple(stated.channel(lab.role, name) for name in lab.kind.channels.names)
+
+
+def through_logger(
+    readings: Array,
+    lab: RecordedLaboratory,
+    system: System,
+    stated: Sequence[ImportedChannel],
+    drive: Sequence[Array],
+) -> Array:
+    """What a logger records of a laboratory's readings (ticks, signals): after its filters and delays.
+
+    With the commands that `drive` the laboratory, it is known what the readings do between ticks.
+    """
+    interval = system.plan.test.interval
+    made = [system.effects.sensors.get(name) for name in lab.kind.channels.names]
+    later = [one.logger_delay if one else 0.0 for one in made]
+    places = [
+        None if channel.filter else (-(channel.delay + more) / interval) % 1.0
+        for channel, more in zip(stated, later, strict=True)
+    ]
+    result = readings
+    if drive and any(place != 0.0 for place in places):
+        between = lab.kind.between_ticks(system, np.stack(drive, axis=1), places)
+        result = result + np.where([place != 0.0 for place in places], between, 0.0)
+    for number, (channel, more) in enumerate(zip(stated, later, strict=True)):
+        if channel.filter or channel.high_pass or channel.delay + more:
+            result[:, number] = channel.through(result[:, number], interval, more)
+    return result
 
 
 def of_logger(

@@ -28,6 +28,7 @@ from diagnosis.recorded.nuisances import (
     of_building,
     of_filters,
     of_logger,
+    through_logger,
 )
 from diagnosis.recorded.record import Late, Record
 from diagnosis.signals import pieces
@@ -203,14 +204,7 @@ class LaboratoryPart:
         drive = [self.inputs.get(name, none) for name in self.devices]
         drive += [none] * (2 - len(drive))
         found = replay.read(self.lab.kind, system, self.motion(system.unread, drive))
-        passed = [channel.filter is not None for channel in self.channels]
-        if any(passed) and not self.steps:
-            found += np.where(passed, self.lab.kind.between_ticks(system, np.stack(drive, axis=1)), 0.0)
-        for place, channel in enumerate(self.channels):
-            made = system.effects.sensors.get(self.lab.kind.channels.names[place])
-            more = made.logger_delay if made else 0.0
-            if channel.filter or channel.high_pass or channel.delay + more:
-                found[:, place] = channel.through(found[:, place], self._interval, more)
+        found = through_logger(found, self.lab, system, self.channels, drive if self.steps == 0 else [])
         if self.freed >= 0:
             found[:, self.freed] += self.begun_elsewhere(self.measured[:, self.freed] - found[:, self.freed])
         return found

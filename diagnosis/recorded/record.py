@@ -89,6 +89,10 @@ class Record:
     labs: tuple[RecordedLaboratory, ...] = ()  # the laboratories that it shows, the master's first
     held: float | None = None  # test time (s) of the first hold, before which it ends; None without a hold
     fast: float = 0.0  # rate by which the clock of its readings was fast before they were put right
+    early: float = 0.0  # s, by which all readings stood before their time until they were put right
+    edges: tuple[
+        str, ...
+    ] = ()  # readings whose first or last ticks a resampling filter spoilt, which do not count
     late: Late = NOT_LATE  # by which a logger delays all channels of a kind
     # filters of channels that its import map does not state, by topic and name
     passed: Mapping[tuple[str, str], LoggerFilter] = field(default_factory=dict)
@@ -184,8 +188,8 @@ class Record:
         """Whether all these signals are there for most of the test."""
         return all(name in self.signals and self.present[name].mean() > 0.5 for name in names)
 
-    def put_right(self, fast: float) -> Record:
-        """The record with readings of a clock that is fast by a rate on the clock of the commands.
+    def put_right(self, fast: float, early: float = 0.0) -> Record:
+        """The record with readings of a clock that is fast by a rate, or `early` (s), on the clock of the commands.
 
         So are the forces that the master used, where they are those that were read.
         """
@@ -199,12 +203,15 @@ class Record:
         ]
         moved = {
             name: clock.put_right(
-                self.signals[name], fast, stepped=quantum(self.signals[name][self.present[name]]) > 0.0
+                self.signals[name],
+                fast,
+                stepped=quantum(self.signals[name][self.present[name]]) > 0.0,
+                early=early / self.plan.test.interval,
             )
             for name in names
             if self.present[name].any()
         }
-        return replace(self, signals=self.signals | moved, fast=fast)
+        return replace(self, signals=self.signals | moved, fast=self.fast + fast, early=self.early + early)
 
     @property
     def time(self) -> Array:
@@ -249,7 +256,7 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
         chosen, every = ideal(chosen), ideal(every)
     plans = {MASTER: every} | ({role: chosen} if role != MASTER else {})
     labs = recorded(every, plans)
-    signals, present = on_ticks(run, topics, without_rows(run, chosen, ticks), labs)
+    signals, present = on_ticks(run, topics, without_rows(run, chosen.test.interval, ticks), labs)
     if against_ideal:
         commanded(signals, present, labs)
     known = plan is None or (own is not None and own.ground_motion == plan.ground_motion)
@@ -305,10 +312,10 @@ def on_ticks(
     return signals, present
 
 
-def without_rows(run: Run, plan: Plan, ticks: int) -> Mask:
+def without_rows(run: Run, interval: float, ticks: int) -> Mask:
     """The ticks (ticks,) at which an imported recording has no rows, and straight lines in their place."""
     stated, result = imported(run), np.zeros(ticks, dtype=bool)
-    t = np.arange(ticks) * plan.test.interval
+    t = np.arange(ticks) * interval
     for begin, end in stated.gaps if stated else ():
         result |= (t > begin) & (t < end)
     return result

@@ -55,16 +55,29 @@ def rate(measured: Array, predicted: Array, there: Mask, interval: float) -> Rat
 
 
 def common(laboratories: Sequence[Sequence[Rate]]) -> float:
-    """The rate that the readings of several laboratories agree on, 0 where they do not, or say nothing for sure."""
-    said = [together(rates) for rates in laboratories if rates]
-    every = [one for rates in laboratories for one in rates]
-    if len(said) < 2:
+    """The rate that the readings of several laboratories agree on, 0 where they do not, or say nothing for sure.
+
+    A nominal model that errs moves each reading's rate by more than its blocks of time show. So where rates scatter by
+    more than their errors, all errors are larger by as much, as in R. T. Birge, Physical Review 40 (1932), 207-227.
+    """
+    if sum(map(bool, laboratories)) < 2:
         return 0.0
+    larger = scatter([one for rates in laboratories for one in rates])
+    known = [[Rate(one.fast, larger * one.error) for one in rates] for rates in laboratories if rates]
+    said = [together(rates) for rates in known]
+    every = [one for rates in known for one in rates]
     found = together(every)
     sure = abs(found.fast) > SURE * found.error and abs(found.fast) < MOST
     alone = all(one.fast * found.fast > 0.0 and abs(one.fast) > ALONE * one.error for one in said)
     agree = all(abs(one.fast - found.fast) < ALONE * np.hypot(one.error, found.error) for one in every)
     return found.fast if sure and alone and agree else 0.0
+
+
+def scatter(rates: Sequence[Rate]) -> float:
+    """By how much rates scatter about their mean over what their errors say, one at least."""
+    mean = together(rates).fast
+    square = sum(((one.fast - mean) / max(one.error, 1e-15)) ** 2 for one in rates)
+    return max(1.0, float(np.sqrt(square / max(1, len(rates) - 1))))
 
 
 def together(rates: Sequence[Rate]) -> Rate:
@@ -74,13 +87,13 @@ def together(rates: Sequence[Rate]) -> Rate:
     return Rate(mean, float(1.0 / np.sqrt(weights.sum())))
 
 
-def put_right(x: Array, fast: float, *, stepped: bool) -> Array:
-    """A reading (ticks,) of a clock that is fast by a rate, on the clock of the ticks.
+def put_right(x: Array, fast: float, *, stepped: bool, early: float = 0.0) -> Array:
+    """A reading (ticks,) of a clock that is fast by a rate, or `early` by so many ticks, on the clock of the ticks.
 
     By a windowed sinc, which leaves white noise its level up to 2 %; on straight lines where the reading is `stepped`,
     so that its steps remain where neighbours are equal.
     """
-    places = np.arange(x.size) / (1.0 + fast)
+    places = (np.arange(x.size) - early) / (1.0 + fast)
     if stepped:
         return np.asarray(np.interp(places, np.arange(x.size), x))
     whole = np.floor(places).astype(np.int64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -83,14 +83,14 @@ class TableKind(Kind):
         lab.state[linear.STROKE], lab.state[linear.STROKE_RATE] = motion, rate
         truth[self.channels.names.index(self.free)] = motion
 
-    def between_ticks(self, system: System, drive: Array) -> Array:
+    def between_ticks(self, system: System, drive: Array, places: Sequence[float | None]) -> Array:
         """Of the damper's force, which the motor bends after each step of its command, and of the acceleration."""
         result = np.zeros((len(drive), len(self.channels.names)))
         force, felt = (
             self.channels.names.index(name) for name in (self.channels.force, "table_acceleration")
         )
-        result[:, force] = -between.motor_bend(system, drive[:, 1])
-        result[:, felt] = between.acceleration_bend(system, drive[:, 0])
+        result[:, force] = -between.motor_bend(system, drive[:, 1], places[force])
+        result[:, felt] = between.acceleration_bend(system, drive[:, 0], places[felt])
         return result
 
     def drifts(self, plan: Plan) -> bool:

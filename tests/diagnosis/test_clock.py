@@ -65,6 +65,14 @@ def test_only_laboratories_that_agree_tell_a_rate() -> None:
     assert clock.common([[clock.Rate(0.01, 1e-6)], [clock.Rate(0.01, 1e-6)]]) == 0.0
 
 
+def test_rates_that_agree_but_for_a_model_that_errs_tell_one() -> None:
+    column = [clock.Rate(58.7e-6, 2.2e-6), clock.Rate(51.6e-6, 3.0e-6)]
+    damper = [clock.Rate(60.2e-6, 1.9e-6), clock.Rate(56.3e-6, 3.9e-6), clock.Rate(70.6e-6, 2.0e-6)]
+    assert clock.common([column, damper]) == pytest.approx(60e-6, rel=0.05)
+    warming = [clock.Rate(5e-6, 2.2e-6), clock.Rate(7e-6, 3.0e-6)]
+    assert clock.common([warming, damper]) == 0.0
+
+
 def test_a_reading_is_put_onto_the_clock_of_the_ticks() -> None:
     found = clock.put_right(motion(TIME * (1.0 + FAST)), FAST, stepped=False)
     inner = slice(clock.TAPS, -clock.TAPS)

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from common.plan.plan import Plan
+from diagnosis.findings import rest
+from diagnosis.findings.found import Diagnosis
 from diagnosis.learned import regression
 from diagnosis.learned.equations import damper_force, platform_acceleration
+from diagnosis.learned.learn import LearnedLaw
 from diagnosis.learned.regression import AGEING, STEADY, Regression, regress
 from laboratories.effects import lay
 from laboratories.kinds import KINDS
@@ -17,6 +22,7 @@ from loop import replay
 from models import preisach
 from models.registry import Array
 from models.system import System
+from tests.diagnosis.cases import Cases
 
 INTERVAL, TICKS = 0.002, 8000
 K, LIMIT = 12.5e6, 0.83e-3  # N/m, m
@@ -203,3 +209,13 @@ def test_a_laboratory_is_simulated_with_a_learned_law(
         assert np.std(change) > 0.0
         return
     assert np.std(change - y) < 0.1 * np.std(y)
+
+
+def test_a_law_with_which_the_simulation_diverges_is_left_out(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    law = cast(LearnedLaw, SimpleNamespace(site="table"))
+    monkeypatch.setattr(rest, "on_itself", lambda _: rest.Gaps(0.1, 0.1, float("nan"), 0.01, rest.STRONGEST))
+    found, gap, warnings = rest.with_laws_that_hold(Diagnosis(cases.record(), learned=[law]), [])
+    assert (list(found.learned), gap) == ([], None)
+    assert "table does not hold" in warnings[0]

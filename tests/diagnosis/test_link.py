@@ -14,6 +14,7 @@ from common.link.mailbox import LinkModel
 from common.plan.laboratory_tables import RigTable
 from common.plan.plan import Plan
 from common.reality import reality
+from common.recording.imported import IMPORT, ImportedData
 from common.recording.reader import read
 from common.recording.run import Run
 from diagnosis.recorded.link.effects import findings
@@ -182,6 +183,19 @@ def test_late_ticks_are_counted_separately_and_are_not_an_effect() -> None:
     assert findings(told, DT) == []
 
 
+def test_rows_that_an_import_lacks_are_no_lost_messages() -> None:
+    run = recorded(ImpairedLink(1), stamps=False)
+    gone = (1.0, 1.4)
+    for topic, name in (("slave", "command_seq"), ("master", "damper_force_seq")):
+        times, used = DT * run.sequences[topic], run.columns[topic][name]
+        used[(times > gone[0]) & (times < gone[1])] = used[times <= gone[0]][-1]
+    assert findings(account(run, DT), DT)
+    run.metadata = {IMPORT: ImportedData("log.csv", gaps=(gone,)).metadata()}
+    assert findings(account(run, DT), DT) == []
+    for found, wanted in zip(exchange_of(run, TICKS, DT), on_time(TICKS), strict=True):
+        assert np.array_equal(found, wanted)
+
+
 # -- recordings -----------------------------------------------------------------------------------
 
 
@@ -189,7 +203,7 @@ def test_a_clean_recording_gives_no_effect_on_the_link(virtual_recording: Path) 
     run = read(virtual_recording)
     assert findings(account(run, DT), DT) == []
     ticks = run.ticks("master")
-    for found, wanted in zip(exchange_of(run, ticks), on_time(ticks), strict=True):
+    for found, wanted in zip(exchange_of(run, ticks, DT), on_time(ticks), strict=True):
         assert np.array_equal(found, wanted)
 
 
@@ -208,7 +222,7 @@ def test_the_exchange_and_time_stamps_in_a_recording_are_those_of_its_network(
     run = played(short_plan, tmp_path / "impaired.mcap", **options)
     network = ImpairedLink(short_plan.test.seed, **options)
     ticks = short_plan.ticks
-    for found, wanted in zip(exchange_of(run, ticks), exchange(ticks, DT, network), strict=True):
+    for found, wanted in zip(exchange_of(run, ticks, DT), exchange(ticks, DT, network), strict=True):
         assert np.array_equal(found, wanted)
     wanted_rows = recorded(network, ticks).columns["latency"]
     for name in ("command_one_way", "feedback_one_way", "round_trip"):

@@ -10,7 +10,7 @@ import pytest
 from scipy import signal
 
 from common.plan.plan import Plan
-from common.recording.imported import LoggerFilter
+from common.recording.imported import LoggerFilter, later
 from laboratories.table import between
 from models.system import System
 
@@ -71,3 +71,37 @@ def test_a_filter_sees_the_acceleration_of_a_table_whose_command_is_ramped(delay
     bent = low_pass.filtered(acceleration[::FINER] + between.acceleration_bend(system, command), interval)
     missed, left = (float(np.std((seen - one)[100:-5])) for one in (at_ticks, bent))
     assert left < 0.1 * missed
+
+
+@pytest.mark.parametrize("late", [0.25, 1.5, 2.8])
+def test_a_delay_by_a_part_of_an_interval_sees_what_lies_between_ticks(late: float) -> None:
+    system = System(Plan())
+    interval, lag = system.plan.test.interval, system.plan.damper.motor_time_constant
+    command = 20.0 * np.sin(2.0 * np.pi * 2.0 * interval * np.arange(TICKS))
+    force, now = np.zeros(TICKS * FINER), 0.0
+    for place in range(1, force.size):
+        now += -math.expm1(-interval / FINER / lag) * (command[(place - 1) // FINER] - now)
+        force[place] = now
+    seen = np.roll(force, round(late * FINER))[::FINER]
+    at_ticks = later(force[::FINER], late)
+    bent = later(force[::FINER] + between.motor_bend(system, command, -late % 1.0), late)
+    missed, left = (float(np.std((seen - one)[50:-5])) for one in (at_ticks, bent))
+    assert left < 0.1 * missed
+    assert not between.motor_bend(system, command, 0.0).any()
+
+
+@pytest.mark.parametrize("late", [0.25, 1.5, 2.8])
+def test_a_delay_sees_the_arcs_of_an_acceleration(late: float) -> None:
+    plan = Plan()
+    system = System(plan)
+    interval, omega = plan.test.interval, 2.0 * np.pi * plan.table.frequency
+    command = 0.01 * np.sin(2.0 * np.pi * 2.0 * interval * np.arange(TICKS))
+    finely = interval / FINER * np.arange(TICKS * FINER)
+    reached = np.interp(finely - plan.table.delay - interval, interval * np.arange(TICKS), command)
+    loop = signal.lti([omega**2, 0.0, 0.0], [1.0, 2.0 * plan.table.damping_ratio * omega, omega**2])
+    acceleration = signal.lsim(loop, reached, finely)[1]
+    seen = np.roll(acceleration, round(late * FINER))[::FINER]
+    at_ticks = later(acceleration[::FINER], late)
+    bent = later(acceleration[::FINER] + between.acceleration_bend(system, command, -late % 1.0), late)
+    missed, left = (float(np.std((seen - one)[100:-5])) for one in (at_ticks, bent))
+    assert left < 0.2 * missed

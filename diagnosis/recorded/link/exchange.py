@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.recording.run import Run
-from diagnosis.recorded.record import laid_out
+from diagnosis.recorded.record import laid_out, without_rows
 from diagnosis.signals.mask import Mask
 from loop.closed_loop import MessagesUsed
 from models.registry import Array
@@ -105,7 +105,7 @@ class Ticks(NamedTuple):
 
 def account(run: Run, interval: float) -> LinkAccount:
     """The account of a recording's messages; ticks at which a laboratory was late itself are left out of it."""
-    ticks = laid(run)
+    ticks = laid(run, interval)
     virtual = on_a_virtual_clock(ticks)
     stamped = int(np.isfinite(ticks.rows.get("round_trip", np.zeros(0))).sum()) >= LEAST_STAMPS
     late = late_ticks(ticks, interval)
@@ -137,9 +137,10 @@ def feedbacks(item: Direction, ticks: Ticks, good: Mask, *, virtual: bool) -> Di
     return item._replace(tried=tried, lost=lost)
 
 
-def laid(run: Run) -> Ticks:
-    """The topics on the ticks; missing values are −1 or NaN."""
+def laid(run: Run, interval: float) -> Ticks:
+    """The topics on the ticks; missing values are −1 or NaN. An import's missing rows are no lost messages."""
     size = 1 + max((int(values.max()) for values in run.sequences.values() if values.size), default=0)
+    unknown = without_rows(run, interval, size)
 
     def column(topic: str, name: str) -> tuple[Array, Mask]:
         values, there = np.full(size, np.nan), np.zeros(size, dtype=bool)
@@ -147,7 +148,7 @@ def laid(run: Run) -> Ticks:
             places = run.sequences[topic]
             values[places] = run.columns[topic][name]
             there[places] = True
-        return values, there
+        return values, there & ~unknown
 
     command, has_slave = column("slave", "command_seq")
     feedback, has_master = column("master", answered(run))
@@ -244,11 +245,17 @@ def certainty(value: float, deviation: float) -> float:
     return min(value / deviation, CERTAIN) if deviation > 0.0 else CERTAIN
 
 
-def exchange_of(run: Run, ticks: int) -> MessagesUsed:
-    """Which message each tick used, as recorded; where a tick is missing, the one before serves on."""
-    result = []
+def exchange_of(run: Run, ticks: int, interval: float) -> MessagesUsed:
+    """Which message each tick used, as recorded; where a tick is missing, the one before serves on.
+
+    Where an import has no rows messages are as old as before.
+    """
+    result, apart = [], without_rows(run, interval, ticks)
     for topic, name in (("slave", "command_seq"), ("master", answered(run))):
         values, there = laid_out(run.columns[topic][name].astype(np.float64), run.sequences[topic], ticks)
         known = np.where(there.cumsum() > 0, values, -1.0).astype(np.int64)
+        if apart.any():
+            last = np.maximum.accumulate(np.where(apart, 0, np.arange(ticks)))
+            known = known[last] + np.arange(ticks) - last
         result.append(np.minimum(known, np.arange(ticks)))
     return MessagesUsed(*result)
