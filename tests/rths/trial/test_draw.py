@@ -256,7 +256,9 @@ def test_every_family_of_effects_is_drawn_equally_often_with_every_signal(shippe
     assert set(families) == {effect.family for effect in library.catalogue.values()}
     usual = 3000 / len(families)
     assert all(abs(count - usual) < 5.0 * math.sqrt(usual) for count in families.values())
-    signals = Counter(library.catalogue[name].signal for name in names if library.catalogue[name].signal)
+    drawn = [library.catalogue[name] for name in names if library.catalogue[name].signal]
+    having = Counter(effect.fault for effect in library.catalogue.values() if effect.signal)
+    signals = Counter(one.signal for one in drawn if having[one.fault] == len(SIGNALS))
     assert len(signals) == len(SIGNALS)
     assert min(signals.values()) > 0.7 * max(signals.values())
 
