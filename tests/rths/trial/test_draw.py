@@ -260,7 +260,8 @@ def test_every_family_of_effects_is_drawn_equally_often_with_every_signal(shippe
     having = Counter(effect.fault for effect in library.catalogue.values() if effect.signal)
     signals = Counter(one.signal for one in drawn if having[one.fault] == len(SIGNALS))
     assert len(signals) == len(SIGNALS)
-    assert min(signals.values()) > 0.7 * max(signals.values())
+    usual = signals.total() / len(signals)
+    assert all(abs(count - usual) < 3.0 * math.sqrt(usual) for count in signals.values())
 
 
 def test_a_pair_hides_two_different_effects() -> None:

@@ -17,7 +17,11 @@ from validation.blind.labs.laying import PLAIN, KnownEffect, Values
 from validation.blind.labs.unlisted import readings
 
 BLOCK = 512  # rows of noise drawn at once, because one call costs as much as a hundred draws
-MOTIONS = ("column_displacement", "table_displacement", "damper_stroke")  # no sensor of these forgets where it stands
+MOTIONS = (
+    "column_displacement",
+    "table_displacement",
+    "damper_stroke",
+)  # no sensor of these forgets where it stands
 LAGS = {"butterworth": 2, "first_order": 1}
 
 
