@@ -50,13 +50,13 @@ class ReadingFault:
     random: bool = False  # as in `Effect`
     motionless: bool = False  # as in `Effect`
     timed: bool = False  # as in `Effect`
-    of: tuple[str, ...] = ()  # units of the readings that can have it, empty for any
+    units: tuple[str, ...] = ()  # of the readings that can have it, empty for any
     # parameters of shape, by the field of `SensorEffects` that each sets
     shapes: Mapping[str, Parameter] = field(default_factory=dict)
 
     def can_be_on(self, signal: SensorSignal) -> bool:
         """Whether a reading of that unit can have it."""
-        return not self.of or signal.unit in self.of
+        return not self.units or signal.unit in self.units
 
     def on(self, name: str, signal: SensorSignal) -> Effect:
         """The effect on the reading of that name."""

@@ -30,5 +30,5 @@ FAULT = ReadingFault(
     says="the reading forgets slow changes",
     reference="time_constant·ẏ + y = time_constant·ẋ",
     timed=True,
-    of=("N", "m/s²", "m/s"),
+    units=("N", "m/s²", "m/s"),
 )
