@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from common.recording.run import Run
 
 IMPORT = "import"  # metadata of an imported recording
-FILTERS = ("butterworth", "bessel")  # the low-pass filters usual before the converters of data loggers
+# The low-pass filters usual before the converters of data loggers, those with a ripple in what they pass last.
+FILTERS = ("butterworth", "bessel", "chebyshev", "elliptic")
+RIPPLING = FILTERS[2:]
 TINY = 1e-12  # Hz, in place of no frequency, at which a high-pass lets nothing pass
 NODES = (-2, -1, 0, 1)  # ticks of the samples around one, through which a cubic goes
 Samples = NDArray[np.float64]
@@ -40,23 +42,23 @@ Samples = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LoggerFilter:
-    """The analogue low-pass filter before a converter."""
+    """The analogue low-pass filter before a converter; what stands still passes it unchanged."""
 
     type: str
     order: int
-    cutoff: float  # Hz, at which 3 dB are lost
+    cutoff: float  # Hz, at which 3 dB are lost, or at which the ripple of a filter ends
+    ripple: float = 0.0  # dB, of what a Chebyshev filter of type I or an elliptic one passes
+    attenuation: float = 0.0  # dB, at least, of what an elliptic one stops
 
     @cached_property
     def transfer(self) -> tuple[Samples, Samples]:
         """Coefficients of numerator and denominator in s (rad/s), the highest power first."""
         from scipy import signal
 
-        omega = 2.0 * math.pi * self.cutoff
-        if self.type == "bessel":
-            above, below = signal.bessel(self.order, omega, analog=True, norm="mag")
-        else:
-            above, below = signal.butter(self.order, omega, analog=True)
-        return np.asarray(above), np.asarray(below)
+        zeros, poles, gain = _design(self.type, self.order, self.ripple, self.attenuation)
+        scaled = gain * self.cutoff ** (poles.size - zeros.size)
+        above, below = signal.zpk2tf(self.cutoff * zeros, self.cutoff * poles, scaled)
+        return np.atleast_1d(above), np.asarray(below)
 
     def response(self, frequency: Samples) -> NDArray[np.complex128]:
         """Frequency response at `frequency` (Hz)."""
@@ -67,7 +69,7 @@ class LoggerFilter:
     @property
     def modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """Poles p (1/s) with no negative imaginary part and weights w (1/s): the real part of Σ w/(s − p)."""
-        poles, weights = _modes(self.type, self.order)
+        poles, weights, _ = _modes(self.type, self.order, self.ripple, self.attenuation)
         return self.cutoff * poles, self.cutoff * weights
 
     def filtered(self, values: Samples, interval: float) -> Samples:
@@ -81,7 +83,8 @@ class LoggerFilter:
 
         moved = values - values[0]
         moved[1:-1] -= np.diff(moved, 2) / 12.0
-        result = np.full(values.size, values[0], dtype=np.float64)
+        at_once = _modes(self.type, self.order, self.ripple, self.attenuation)[2]
+        result = np.asarray(values[0] + at_once * (values - values[0]), dtype=np.float64)
         for pole, weight in zip(*self.modes, strict=True):
             step = pole * interval
             kept = np.exp(step)
@@ -238,19 +241,36 @@ def exchange_known(run: Run) -> bool:
 
 
 @cache
-def _modes(kind: str, order: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Poles and weights of a filter whose cutoff is 1 Hz."""
+def _design(
+    kind: str, order: int, ripple: float, attenuation: float
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128], float]:
+    """Zeros, poles and gain of a filter whose cutoff is 1 Hz, and whose gain at rest is one."""
     from scipy import signal
 
-    omega = 2.0 * math.pi
+    shared: dict[str, Any] = {"Wn": 2.0 * math.pi, "analog": True, "output": "zpk"}
     if kind == "bessel":
-        _, poles, gain = signal.bessel(order, omega, analog=True, output="zpk", norm="mag")
+        zeros, poles, gain = signal.bessel(order, norm="mag", **shared)
+    elif kind == "chebyshev":
+        zeros, poles, gain = signal.cheby1(order, ripple, **shared)
+    elif kind == "elliptic":
+        zeros, poles, gain = signal.ellip(order, ripple, attenuation, **shared)
     else:
-        _, poles, gain = signal.butter(order, omega, analog=True, output="zpk")
+        zeros, poles, gain = signal.butter(order, **shared)
+    at_rest = gain * np.prod(-zeros) / np.prod(-poles)
+    return zeros, poles, float(gain / at_rest.real)
+
+
+@cache
+def _modes(
+    kind: str, order: int, ripple: float, attenuation: float
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128], float]:
+    """Poles and weights of a filter whose cutoff is 1 Hz, and its gain for what is infinitely fast."""
+    zeros, poles, gain = _design(kind, order, ripple, attenuation)
     apart = poles[:, None] - poles[None, :] + np.eye(poles.size)
-    weights = gain / np.prod(apart, axis=1)
+    weights = gain * np.prod(poles[:, None] - zeros[None, :], axis=1) / np.prod(apart, axis=1)
     upper = poles.imag >= 0.0
-    return poles[upper], np.where(poles.imag > 0.0, 2.0, 1.0)[upper] * weights[upper]
+    paired = np.where(poles.imag > 0.0, 2.0, 1.0)[upper] * weights[upper]
+    return poles[upper], paired, gain if zeros.size == poles.size else 0.0
 
 
 def _plain(channel: ImportedChannel) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from common.plan.plan import Plan
 from common.plan.schema import as_type, fill, key, nearest
 from common.plan.toml_file import load_tables
 from common.plan.units import converted
-from common.recording.imported import FILTERS, LoggerFilter
+from common.recording.imported import FILTERS, RIPPLING, LoggerFilter
 from common.roles import MASTER, latency_topic, name_of
 from common.signals import FieldType, Signal
 from report.text.text_form import StatedForm
@@ -58,7 +58,17 @@ class FilterTable:
 
     type: str = key("kind of filter", choices=FILTERS)
     order: int = key("order", least=1, most=12)
-    cutoff: float = key("frequency at which 3 dB are lost", above=0.0, unit="Hz")
+    cutoff: float = key(
+        "frequency at which 3 dB are lost; at which the ripple ends of a chebyshev or elliptic one",
+        above=0.0,
+        unit="Hz",
+    )
+    ripple: float = key(
+        "of a chebyshev or elliptic one, in what it passes", default=0.5, above=0.0, most=3.0, unit="dB"
+    )
+    attenuation: float = key(
+        "of an elliptic one, least of what it stops", default=60.0, least=20.0, unit="dB"
+    )
 
 
 @dataclass(frozen=True)
@@ -199,7 +209,7 @@ def source(path: Path, name: str, entry: Any, known: Known) -> SignalSource:
         raise InputError(f"Unknown signal '{name}' in {path}: {nearest(name, known)}")
     where, (_, row) = f"signals.{name}", known[name]
     try:
-        values = dict(entry)
+        values = as_table(entry, where, '{ column = "name" }')
         apart = {word: values.pop(word) for word in APART if word in values}
         for word in OUR_OWN:
             if word in values:
@@ -209,7 +219,7 @@ def source(path: Path, name: str, entry: Any, known: Known) -> SignalSource:
             raise PlanError(f"'{name}' in [signals] has both a unit and a scale: give one of them.")
         scale = in_unit(found.unit, row, name) if found.unit else found.scale
         step, low_pass = stated(apart, row, where)
-    except (PlanError, TypeError, ValueError) as error:
+    except (PlanError, ValueError) as error:
         raise InputError(f"{path}: {error}") from None
     value = apart.get("value")
     if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
@@ -226,6 +236,13 @@ def source(path: Path, name: str, entry: Any, known: Known) -> SignalSource:
     )
 
 
+def as_table(given: Any, where: str, example: str) -> dict[str, Any]:
+    """A copy of a table of the map; raises PlanError where there is something else."""
+    if not isinstance(given, dict):
+        raise PlanError(f"{where} is {given!r}, but must be a table such as {example}.")
+    return dict(given)
+
+
 def stated(apart: dict[str, Any], row: Signal, where: str) -> tuple[float, LoggerFilter | None]:
     """Resolution and filter of a signal; raises PlanError."""
     step = as_type("float", apart.get("resolution", 0.0), f"resolution in [{where}]", row.unit)
@@ -233,8 +250,13 @@ def stated(apart: dict[str, Any], row: Signal, where: str) -> tuple[float, Logge
         raise PlanError(f"resolution in [{where}] is {step:g}, but must be at least 0 {row.unit}.")
     if "filter" not in apart:
         return step, None
-    found = fill(FilterTable, apart["filter"], f"{where}.filter")
-    return step, LoggerFilter(found.type, found.order, found.cutoff)
+    low_pass = as_table(
+        apart["filter"], f"{where}.filter", '{ type = "butterworth", order = 4, cutoff = 100.0 }'
+    )
+    found = fill(FilterTable, low_pass, f"{where}.filter")
+    ripple = found.ripple if found.type in RIPPLING else 0.0
+    attenuation = found.attenuation if found.type == "elliptic" else 0.0
+    return step, LoggerFilter(found.type, found.order, found.cutoff, ripple, attenuation)
 
 
 def in_unit(unit: str, row: Signal, name: str) -> float:

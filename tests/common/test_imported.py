@@ -56,6 +56,30 @@ def test_a_filter_attenuates_3_db_at_its_cutoff_and_delays_slow_motion(kind: str
     assert np.max(np.abs(low_pass.filtered(slow, 0.001) - expected)[500:]) < 1e-3
 
 
+RIPPLING = [LoggerFilter("chebyshev", 5, 80.0, 0.5), LoggerFilter("elliptic", 4, 80.0, 0.2, 50.0)]
+
+
+@pytest.mark.parametrize("low_pass", RIPPLING, ids=["chebyshev", "elliptic"])
+def test_a_filter_with_a_ripple_loses_it_at_its_cutoff_and_nothing_at_rest(low_pass: LoggerFilter) -> None:
+    frequencies = np.linspace(0.0, 80.0, 400)
+    gain = np.abs(low_pass.response(frequencies))
+    assert gain[0] == pytest.approx(1.0)
+    assert 20.0 * math.log10(gain.max() / gain.min()) == pytest.approx(low_pass.ripple, rel=1e-3)
+    assert gain[-1] == pytest.approx(gain.min())
+    beyond = np.abs(low_pass.response(np.linspace(400.0, 4000.0, 400)))
+    assert beyond.max() < (10.0 ** (-low_pass.attenuation / 20.0) * 1.03 if low_pass.attenuation else 1e-3)
+
+
+@pytest.mark.parametrize("low_pass", RIPPLING, ids=["chebyshev", "elliptic"])
+def test_a_signal_behind_a_filter_with_a_ripple_is_what_its_response_says(low_pass: LoggerFilter) -> None:
+    interval = 1e-3
+    t = np.arange(4000) * interval
+    for frequency in (2.0, 30.0):
+        seen = low_pass.filtered(np.sin(2.0 * math.pi * frequency * t), interval)[1000:-1]
+        turned = low_pass.response(np.array([frequency]))[0] * np.exp(2j * math.pi * frequency * t[1000:-1])
+        assert np.max(np.abs(seen - turned.imag)) < 2e-2 * (2.0 * math.pi * frequency * interval) ** 2
+
+
 @pytest.mark.parametrize("order", [1, 4, 12])
 @pytest.mark.parametrize("kind", ["butterworth", "bessel"])
 def test_a_filter_far_below_the_rate_keeps_its_digits(kind: str, order: int) -> None:
