@@ -16,7 +16,7 @@ from common.host.clock import unix_ns
 from common.host.machine import facts
 from common.lab.preflight import ACCEPTED
 from common.plan.plan import Plan
-from common.recording.run import CLOCK, GROUND
+from common.recording.run import CLOCK
 from common.recording.writer import Recording
 from common.safety.risks import Risk
 from common.signals import Signal
@@ -25,6 +25,9 @@ from laboratories.kinds import topics
 from models.ground_motion import GroundMotion
 from models.registry import Array
 
+MotionRows = tuple[
+    GroundMotion, Array
+]  # a plan's record, and its rows as `loop.substructure.ground_rows` gives them
 PACKAGES = ("rths", "eclipse-zenoh", "mcap", "msgpack", "numba", "numpy", "protobuf", "scipy")
 
 
@@ -64,7 +67,7 @@ def checked(path: Path) -> Path:
 def begin(
     path: Path,
     plan: Plan,
-    ground: tuple[GroundMotion, Array] | None,
+    ground: MotionRows | None,
     at_ns: int = 0,
     accepted: Sequence[Risk] = (),
     *,
@@ -87,8 +90,7 @@ def begin(
     recording.metadata(CLOCK, {"kind": clock})
     if ground is not None:
         record, rows = ground
-        recording.metadata(GROUND, {"record": record.describe(), "scale": repr(plan.ground_motion.scale)})
-        recording.attach(GROUND, rows.astype("<f8").tobytes(), "application/octet-stream")
+        recording.ground(record.describe(), plan.ground_motion.scale, rows)
     recording.add("event", at_ns, at_ns, (0.0, "recorder", "info", "begin", "recording begun", {}))
     for risk in accepted:
         text = f"risk '{risk.name}' accepted: {risk.sentence}."

@@ -19,7 +19,9 @@ from mcap.writer import CompressionType, Writer
 from common.errors import InputError
 from common.recording.checksums import CHECKSUMS, checksum, sealed
 from common.recording.chunks import Block, pack_messages
+from common.recording.imported import Samples
 from common.recording.index import pack_index
+from common.recording.run import GROUND
 from common.recording.schema import message_class, message_name, schema_file
 from common.roles import SLAVE
 from common.signals import Signal, shared
@@ -202,6 +204,11 @@ class Recording:
     def attach(self, name: str, data: bytes, media_type: str) -> None:
         """Write an attachment; its times are zero so that the same test gives the same file."""
         self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+
+    def ground(self, record: str, scale: float, rows: Samples) -> None:
+        """Write the rows (2, ticks + 1) of a plan's ground motion, m/s² and m, and what its record is and its scale."""
+        self.metadata(GROUND, {"record": record, "scale": repr(scale)})
+        self.attach(GROUND, rows.astype("<f8").tobytes(), "application/octet-stream")
 
     def flush(self) -> None:
         """Hand everything to the operating system; raises OSError where the disk does not take it.

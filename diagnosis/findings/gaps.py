@@ -57,6 +57,11 @@ class RecordingGaps:
         own = record is found.record
         whole = [verdict.search.data.part for verdict in found.verdicts] if own else parts_of(record)
         self._parts = [part for part in whole if not part.exact]
+        # where each reading judges: without the loop not where it follows from commands that are missing
+        self._there = dict(record.present)
+        if self.loop is None:
+            for part in self._parts:
+                self._there |= dict(zip(part.signals, part.present.T, strict=True))
 
     @property
     def judges(self) -> bool:
@@ -135,14 +140,14 @@ class RecordingGaps:
         names = [
             name
             for name in self.record.responses
-            if name in known and self.record.has(name) and self.moves(name)
+            if name in known and self.record.has(name) and self.moves(name) and self._there[name].any()
         ]
         result = {}
-        for name in names or [name for name in known if self.record.has(name)]:
-            there = self.record.present[name] & chosen
+        for name in names or [name for name in known if self.record.has(name) and self._there[name].any()]:
+            there = self._there[name] & chosen
             recorded = self.record.signals[name][there]
             error = recorded - known[name][there]
-            level = float(np.mean(recorded**2))
+            level = float(np.mean(recorded**2)) if recorded.size else 0.0
             result[name] = float(np.sqrt(np.mean(error**2) / level)) if level > 0.0 else 0.0
         return result
 
@@ -175,6 +180,6 @@ class RecordingGaps:
 
     def over(self, name: str, rms: float) -> float:
         """An rms of a reading's unit over that of the reading where the gap is judged, 0 where it has none."""
-        there = self.record.present[name] & self.mask
+        there = self._there[name] & self.mask
         level = float(np.mean(self.record.signals[name][there] ** 2)) if there.any() else 0.0
         return rms / math.sqrt(level) if level > 0.0 else 0.0

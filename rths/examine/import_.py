@@ -18,6 +18,8 @@ from report.text.progress import Progress
 from report.text.text_form import TextForm
 
 if TYPE_CHECKING:
+    from common.plan.plan import Plan
+    from recorder.files import MotionRows
     from rths.examine.import_map import ImportMap, Known
     from rths.examine.onto_ticks import OnTicks
 
@@ -56,16 +58,39 @@ def run(args: argparse.Namespace) -> int:
         mapping = load_map(args.map)
         table = tabular.read_table(args.data, mapping.form)
         found = on_ticks(mapping, table, args.data, as_is=args.as_is)
+        ground, unread = ground_of(mapping, found)
         with outputs.writing(args.output, args.force, inputs) as path:
-            write(path, mapping, found, args.data.name, as_is=args.as_is)
+            write(path, mapping, found, args.data.name, ground, as_is=args.as_is)
             if not args.as_is:
                 check_slips(path, args.data)
-    show(args, mapping, found, table.form)
+    show(args, mapping, found, table.form, unread)
     return 0
 
 
-def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: TextForm | None) -> None:
-    """Say what was written and read, which signals are absent or interpolated, and whether the link can be judged."""
+def ground_of(mapping: ImportMap, found: OnTicks) -> tuple[MotionRows | None, str]:
+    """The plan's ground motion where a building was recorded, and the sentence that says why it cannot be read."""
+    from loop.substructure import recorded_ground
+
+    if not {row.name for row in signals.BUILDING} & found.values.keys():
+        return None, ""
+    try:
+        return recorded_ground(plan_of(mapping, found)), ""
+    except InputError as error:
+        return None, str(error)
+
+
+def plan_of(mapping: ImportMap, found: OnTicks) -> Plan:
+    """The plan of the map, of a test as long as the data."""
+    return with_test(mapping.plan, duration=found.t.size * mapping.plan.test.interval)
+
+
+def show(
+    args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: TextForm | None, unread: str
+) -> None:
+    """Say what was written and read, which signals are absent or interpolated, and what can be judged.
+
+    `unread` says why the plan's ground motion could not be read, if so.
+    """
     from rths.examine.import_map import lab_signals
 
     known, present = lab_signals(mapping.plan), list(found.values)
@@ -79,6 +104,7 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: Tex
             "link": "judged" if judged else UNJUDGED,
             "units": found.units,
             "gaps": found.gaps,
+            "ground": unread or "read",
             "text": form and form._asdict(),
         }
         say(json.dumps(report) + "\n")
@@ -102,6 +128,8 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: Tex
         say(
             f"no rows from {begin:.6g} to {end:.6g} s{more}: straight lines stand there, which a diagnosis leaves out\n"
         )
+    if unread:
+        say(f"ground: the whole test cannot be simulated from this recording: {unread}\n")
     if mapping.plan.roles and not (judged or mapping.static):
         say(f"link: {UNJUDGED}\n")
 
@@ -115,8 +143,19 @@ def exchange(mapping: ImportMap) -> bool:
     return any(row.kind is signals.FieldType.INDEX or row.name in STAMPS for row in rows)
 
 
-def write(path: Path, mapping: ImportMap, found: OnTicks, data: str, *, as_is: bool = False) -> None:
-    """Write the recording: topics and fields for the signals at hand, the plan, and what is stated of the channels."""
+def write(
+    path: Path,
+    mapping: ImportMap,
+    found: OnTicks,
+    data: str,
+    ground: MotionRows | None = None,
+    *,
+    as_is: bool = False,
+) -> None:
+    """Write the recording: topics and fields for the signals at hand, the plan, and what is stated of the channels.
+
+    With its `ground` motion it can be judged without the file of that motion.
+    """
     from common.recording.imported import IMPORT, ImportedData
     from common.recording.writer import Recording
     from rths.examine.import_map import lab_signals
@@ -125,7 +164,7 @@ def write(path: Path, mapping: ImportMap, found: OnTicks, data: str, *, as_is: b
     given: dict[str, list[str]] = {}
     for name in (name for name in known if name in found.values):
         given.setdefault(known[name][0], []).append(name)
-    plan = with_test(mapping.plan, duration=found.t.size * mapping.plan.test.interval)
+    plan = plan_of(mapping, found)
     columns = {topic: columns_of(topic, names, found, known) for topic, names in given.items()}
     stated = {
         topic: {known[name][1].name: found.stated[name] for name in names} for topic, names in given.items()
@@ -136,6 +175,8 @@ def write(path: Path, mapping: ImportMap, found: OnTicks, data: str, *, as_is: b
     recording.describe()
     gaps = tuple((begin - found.begin, end - found.begin) for begin, end in found.gaps)
     recording.metadata(IMPORT, ImportedData(data, mapping.static, stated, as_is, gaps).metadata())
+    if ground:
+        recording.ground(ground[0].describe(), plan.ground_motion.scale, ground[1])
     for topic, rows in columns.items():
         for tick, values in enumerate(zip(*rows.values(), strict=True)):
             at = plan.tick_ns(tick)

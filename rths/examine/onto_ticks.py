@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from rths.examine.import_map import ImportMap, SignalSource, in_unit, lab_signal
 FAR_APART, TOO_CLOSE = 90.0, 900.0
 GAP = 5.0  # usual distances of rows from which on rows are missing between two: those of a logger's clock differ less
 FOR_A_SPLINE = 4  # rows at least
+EVENLY = 1.5  # usual distances of a channel's own rows, from which on one is missing
 ON_TICKS = 1e-3  # of an interval, within which a row is on its tick: times in a text file are rounded to a microsecond
 
 
@@ -46,7 +48,7 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
     """The signals at the plan's interval, by a cubic spline; numbers of messages are held.
 
     Raises:
-        InputError: a column is missing or has a gap, its unit is of another quantity, or time does not increase or,
+        InputError: a column is missing or has a hole, its unit is of another quantity, or time does not increase or,
             unless `as_is`, has another unit.
     """
     theirs, rows = time_base(mapping, table, data)
@@ -75,19 +77,41 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
             found.stated[name] = ImportedChannel(known=True)
             continue
         column = pick(table, source.column, data)[rows]
-        bad = np.flatnonzero(~np.isfinite(column))
-        if bad.size:
-            place = int(np.arange(rows.size)[rows][bad[0]]) + 1
+        own = np.isfinite(column)
+        if not own.all() and (mapping.static or not every_so_often(theirs, own, gaps_between(gaps, begin))):
+            place = int(np.arange(rows.size)[rows][np.flatnonzero(~own)[0]]) + 1
             raise InputError(
                 f"{data}: column '{source.column}' has no number in row {place}: fill the gap or cut it out."
             )
         scale, unit = scale_of(name, source, row, table, data)
         if unit:
             found.units[name] = unit
-        values = scale * column + source.offset
-        found.values[name] = moved(theirs, values, t, row) if between else values[nearest_rows(theirs, t)]
-        found.stated[name] = channel(source, row, rate, between=between)
+        times, values = theirs[own], scale * column[own] + source.offset
+        apart = between if own.all() else not stands_on(times, t, interval)
+        found.values[name] = moved(times, values, t, row) if apart else values[nearest_rows(times, t)]
+        own_rate = rate if own.all() else 1.0 / float(np.median(np.diff(times)))
+        found.stated[name] = channel(source, row, own_rate, between=apart)
     return found
+
+
+def gaps_between(gaps: Sequence[tuple[float, float]], begin: float) -> list[tuple[float, float]]:
+    """Times between which rows are missing, s from where the data begin."""
+    return [(last - begin, following - begin) for last, following in gaps]
+
+
+def every_so_often(theirs: Array, own: npt.NDArray[np.bool_], gaps: Sequence[tuple[float, float]]) -> bool:
+    """Whether a channel has its numbers at a rate of its own, as one that is logged half as often: not with holes.
+
+    `theirs` are the times of all rows, s, `own` those with a number, and between `gaps` no channel has any.
+    """
+    times = theirs[own]
+    if times.size < FOR_A_SPLINE:
+        return False
+    apart = np.diff(times)
+    usual = EVENLY * float(np.median(apart))
+    holes = ((times[place], times[place + 1]) for place in np.flatnonzero(apart > usual))
+    within = all(any(last <= a and b <= following for a, b in gaps) for last, following in holes)
+    return within and times[0] - theirs[0] < usual and theirs[-1] - times[-1] < usual
 
 
 def refuse_unit(mapping: ImportMap, theirs: Array, data: Path) -> None:
@@ -138,7 +162,7 @@ def moved(theirs: Array, values: Array, t: Array, row: Signal) -> Array:
         return np.asarray(straight)
     from scipy.interpolate import CubicSpline
 
-    smooth = np.asarray(CubicSpline(theirs, values)(t))
+    smooth = np.asarray(CubicSpline(theirs, values)(np.clip(t, theirs[0], theirs[-1])))
     for begin, end in missing_rows(theirs):
         inside = (t > begin) & (t < end)
         smooth[inside] = straight[inside]

@@ -13,6 +13,7 @@ from common.recording.imported import ImportedData, LoggerFilter, imported
 from common.recording.reader import read
 from common.recording.run import Run
 from diagnosis.recorded import slips
+from diagnosis.recorded.record import build
 from report.text.tabular import read_table
 from report.text.text_form import StatedForm, TextForm
 
@@ -44,8 +45,10 @@ def known(run: Run) -> ImportedData:
 def bring(call: Any, tmp_path: Path) -> Any:
     """Import data under a map; exit code and the recording, None where there is none."""
 
-    def brought(data: str, rows: str, top: str = 'time = "t"\n', *more: str) -> tuple[int, Run | None]:
-        (tmp_path / "plan.toml").write_text(PLAN)
+    def brought(
+        data: str, rows: str, top: str = 'time = "t"\n', *more: str, plan: str = PLAN
+    ) -> tuple[int, Run | None]:
+        (tmp_path / "plan.toml").write_text(plan)
         (tmp_path / "data.csv").write_bytes(data.encode("latin-1"))
         (tmp_path / "map.toml").write_text(f'plan = "plan.toml"\n{top}[signals]\n{rows}')
         out = tmp_path / "a.mcap"
@@ -157,6 +160,43 @@ def test_rows_on_the_ticks_keep_their_steps_although_times_are_not_exact(bring: 
     assert set(np.unique(run.columns["master"]["column_displacement"])) == set(np.unique(1e-3 * steps))
 
 
+SLOW = 0.03 * np.arange(134) + 0.004  # s, rows of a channel with a clock of its own
+OTHER_RATES = {
+    "half as often": (TIMES, slice(1, None, 2), 50.0),
+    "of two loggers": (np.unique(np.r_[TIMES, SLOW]), None, 1.0 / 0.03),
+}
+
+
+@pytest.mark.parametrize("case", OTHER_RATES)
+def test_a_channel_with_a_rate_of_its_own_has_empty_cells(bring: Any, case: str) -> None:
+    times, rows, rate = OTHER_RATES[case]
+    motion = 5.0 * np.sin(2.0 * np.pi * 0.7 * times)
+    read = np.full(times.size, np.nan)
+    there = np.isin(times, SLOW) if rows is None else rows
+    read[there] = motion[there]
+    commanded = np.where(np.isin(times, TIMES), motion, np.nan)
+    text = table("t,u,y", times, commanded, read).replace("nan", "")
+    code, run = bring(text, DRIVE)
+    assert code == 0
+    ticks = run.columns["master"]["t"]
+    found = run.columns["master"]["column_displacement"]
+    inside = (ticks > 0.1) & (ticks < 3.9)
+    expected = 5e-3 * np.sin(2.0 * np.pi * 0.7 * ticks)
+    assert np.max(np.abs(found - expected)[inside]) < 2e-7
+    assert run.columns["master"]["actuator_command"] == pytest.approx(expected, abs=1e-11)
+    channels = [known(run).channel("master", name) for name in ("column_displacement", "actuator_command")]
+    assert [one.interpolated for one in channels] == [True, False]
+    assert [one.rate for one in channels] == pytest.approx([rate, 100.0])
+
+
+@pytest.mark.parametrize("holes", [slice(200, 201), slice(200, 260), slice(0, 30), slice(380, None)])
+def test_a_channel_with_a_hole_is_refused(bring: Any, capsys: Any, holes: slice) -> None:
+    read = LATE.copy()
+    read[holes] = np.nan
+    assert bring(table("t,u,y", TIMES, COMMAND, read).replace("nan", ""), DRIVE)[0] == 2
+    assert "column 'y' has no number in row" in capsys.readouterr().err
+
+
 def test_start_and_stop_select_a_part_of_the_data(bring: Any) -> None:
     code, run = bring(table("t,u,y", TIMES, COMMAND, LATE), DRIVE, 'time = "t"\nstart = 1.0\nstop = 2.0\n')
     assert code == 0
@@ -255,6 +295,17 @@ WRONG = {
         "butterworth",
     ),
     "filter without cutoff": ('x = { column = "u", filter = { type = "bessel", order = 4 } }', "", "cutoff"),
+    "name in place of a table": ('x = "u"', "", 'must be a table such as { column = "name" }'),
+    "name in place of a filter": (
+        'x = { column = "u", filter = "bessel" }',
+        "",
+        "must be a table such as { type =",
+    ),
+    "negative ripple": (
+        'x = { column = "u", filter = { type = "chebyshev", order = 4, cutoff = 80.0, ripple = -1.0 } }',
+        "",
+        "ripple",
+    ),
     "negative resolution": ('x = { column = "u", resolution = -1.0 }', "", "at least 0"),
     "stop before start": ('x = { column = "u" }', "start = 3.0\nstop = 2.0\n", "must be after start"),
     "no rows": ('x = { column = "u" }', "start = 30.0\n", "fewer than two rows"),
@@ -274,6 +325,48 @@ def test_an_import_map_that_does_not_fit_is_refused_in_one_sentence(
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
+
+
+RIPPLING = {
+    "chebyshev": ("", LoggerFilter("chebyshev", 5, 80.0, 0.5)),
+    "elliptic": (', ripple = 0.2, attenuation = "50 dB"', LoggerFilter("elliptic", 5, 80.0, 0.2, 50.0)),
+}
+
+
+@pytest.mark.parametrize("kind", RIPPLING)
+def test_filters_with_a_ripple_can_be_stated(bring: Any, kind: str) -> None:
+    more, wanted = RIPPLING[kind]
+    stated = f'filter = {{ type = "{kind}", order = 5, cutoff = 80.0{more} }}'
+    _, run = bring(table("t,u,y", TIMES, COMMAND, LATE), DRIVE.replace('"y",', f'"y", {stated},'))
+    assert known(run).channel("master", "column_displacement").filter == wanted
+
+
+MOTION = "[ground_motion]\nrecord = 'motion.csv'\nscale = 2.0\n"
+BUILDING = 'ground_acceleration = { column = "a" }\ndisplacement = { column = "x" }\n'
+STRONG = np.sin(2.0 * np.pi * TIMES) * (TIMES < 3.0)  # m/s²
+
+
+def test_a_whole_test_keeps_the_ground_motion_of_its_plan(bring: Any, tmp_path: Path) -> None:
+    away = tmp_path / "away"
+    away.mkdir()
+    (tmp_path / "motion.csv").write_text(table("time (s),acceleration (m/s2)", TIMES, 0.5 * STRONG))
+    _, run = bring(table("t,a,x", TIMES, STRONG, 1e-3 * LATE), BUILDING, 'time = "t"\n', plan=PLAN + MOTION)
+    (tmp_path / "motion.csv").unlink()
+    moved = (tmp_path / "a.mcap").rename(away / "a.mcap")
+    ground = build(read(moved)).ground
+    assert ground is not None
+    assert ground[0, : TIMES.size] == pytest.approx(STRONG, abs=1e-8)
+    assert run.metadata["ground_motion"]["scale"] == "2.0"
+
+
+def test_a_ground_motion_that_cannot_be_read_is_said_at_import(bring: Any, capsys: Any) -> None:
+    data = table("t,a,x", TIMES, STRONG, 1e-3 * LATE)
+    code, run = bring(data, BUILDING, 'time = "t"\n', plan=PLAN + MOTION)
+    assert code == 0
+    assert not run.attachments
+    said = capsys.readouterr().out
+    assert "ground: the whole test cannot be simulated from this recording: " in said
+    assert "motion.csv" in said
 
 
 def test_the_json_report_states_how_the_data_were_imported(bring: Any, capsys: Any) -> None:
