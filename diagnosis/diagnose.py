@@ -14,9 +14,10 @@ from common.errors import InputError
 from common.plan.kinds import COLUMN
 from common.recording.imported import exchange_known
 from common.terminal.telling import Tell, untold
-from diagnosis.findings import filters, logger, report, where
+from diagnosis.findings import report, where
 from diagnosis.findings.certainty.other_causes import small
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.logged import building, filters, logger
 from diagnosis.findings.sensors import jumps, outliers, readings, staircases, swaying, uneven_noise
 from diagnosis.findings.sensors.loud_noise import no_noise
 from diagnosis.findings.sensors.noise_levels import highest_rms, lines_rms, noise_rms
@@ -26,13 +27,12 @@ from diagnosis.findings.verdict import (
     UNNAMED,
     WITHOUT_GAP,
     PartVerdict,
-    judge,
     seen_in,
 )
 from diagnosis.fits import residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import Search, search
+from diagnosis.fits.search import Search
 from diagnosis.learned.learn import learn
 from diagnosis.recorded.divided import BUILDING, driven, parts_of, used
 from diagnosis.recorded.ground import Ground
@@ -40,20 +40,14 @@ from diagnosis.recorded.joined import joined, laboratory_of, refuse_others
 from diagnosis.recorded.link import effects as link_effects
 from diagnosis.recorded.link import exchange
 from diagnosis.recorded.link.exchange import LinkFinding
-from diagnosis.recorded.logged_building import LoggedBuilding, logged
 from diagnosis.recorded.missing_rows import unjudged
-from diagnosis.recorded.parts import Building, LaboratoryPart, Part
+from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from models.registry import Array
 from models.system import System
 
 # s. A shorter recording is not judged: it holds less than one period of the default building's first mode (2 Hz).
 SHORTEST = 0.5
-# Ratio of the noise in a balance of forces to that of the forces used, from which on a logger caused it.
-# A wrong mass gives a smaller ratio.
-OTHERS = 0.7
-# Share of a balance's rms below which its content at the highest frequencies belongs to the motion.
-SMOOTH = 1e-5
 # Correlation of a reading with its prediction below which its sign is doubted. It is that of two sines 135° apart,
 # which no delay of a stable test reaches: the compensated loop is unstable long before.
 AGAINST = -0.7
@@ -265,49 +259,7 @@ def judge_part(
     data = residuals.prepare(part, record, steps)
     whole = joined(part, further, data.group)
     joint = data if whole is part else residuals.prepare(whole, record, steps)
-    return data, seen_in(data, verdict_on(joint, scales, other_view(part, record, steps)))
-
-
-def other_view(part: Part, record: Record, steps: Mapping[str, float]) -> Data | None:
-    """A building as one whose forces a logger recorded, None for all else."""
-    view = logged(part) if isinstance(part, Building) else None
-    return None if view is None else residuals.prepare(view, record, view.rounded(steps))
-
-
-def verdict_on(data: Data, scales: Scales, view: Data | None = None) -> PartVerdict:
-    """The verdict on a part; a building that no effect makes exact is judged as one whose forces a logger recorded.
-
-    It is so from the start where the forces recorded have noise that those used had not.
-    """
-    if view is None or not own_noise(view):
-        verdict = judge(search(data, scales))
-        if view is None or verdict.outcome not in UNNAMED:
-            return verdict
-    verdict = judge(search(view, scales))
-    return verdict if verdict.outcome in WITHOUT_GAP else verdict_over_longer(view, scales) or verdict
-
-
-def verdict_over_longer(view: Data, scales: Scales) -> PartVerdict | None:
-    """The verdict on a building's balance over longer averages where these show no gap, else None.
-
-    What its parameters or forces do shows over these as well; noise that only the controller read does not.
-    """
-    part = view.part
-    longer = residuals.over_longer(view, part) if isinstance(part, LoggedBuilding) else None
-    verdict = None if longer is None else judge(search(longer, scales))
-    return verdict if verdict and verdict.outcome in WITHOUT_GAP else None
-
-
-def own_noise(data: Data) -> bool:
-    """Whether the balance of a building's forces has noise that its motion, and so the forces used, did not have.
-
-    Forces that lie behind a filter or delay of the logger are not those used, whatever their noise.
-    """
-    if isinstance(data.part, LoggedBuilding) and data.part.behind:
-        return True
-    used = residuals.noise(data.part.measured)
-    least = SMOOTH * np.sqrt(np.mean(np.square(data.part.measured), axis=0))
-    return bool(np.any(data.white > np.maximum(OTHERS * used, least)))
+    return data, seen_in(data, building.verdict_on(joint, scales, building.other_view(part, record, steps)))
 
 
 def exchanged(record: Record) -> list[LinkFinding]:

@@ -111,6 +111,11 @@ class Record:
         return said
 
     @property
+    def gapped(self) -> bool:
+        """Whether rows are missing, in whose place straight lines stand."""
+        return bool(self.mapped and self.mapped.gaps)
+
+    @property
     def static(self) -> bool:
         """Whether its times have no meaning, since only the order of its rows was stated."""
         return is_static(self.run)

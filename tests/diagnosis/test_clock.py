@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.diagnose import examine
-from diagnosis.findings import logger
+from diagnosis.findings.logged import logger
 from diagnosis.recorded.record import Record
 from diagnosis.signals import clock
 from diagnosis.signals.noise import quantum_between

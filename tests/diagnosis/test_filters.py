@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from common.recording.imported import NOTHING_STATED, ImportedChannel, LoggerFilter
+from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, ImportedData, LoggerFilter
 from common.roles import MASTER
-from diagnosis.findings import filters, logger
 from diagnosis.findings.found import Diagnosis
+from diagnosis.findings.logged import filters, logger
 from diagnosis.fits import fitting, residuals, settling, worth
 from diagnosis.fits.evidence import BEYOND
 from diagnosis.recorded import logged_building
@@ -77,6 +77,48 @@ def test_a_filter_of_all_channels_is_one(cases: Cases) -> None:
     found = filters.filtered(imported(cases.record(), behind_digital))
     assert len(set(found.passed.values())) <= 1
     assert late(found) == pytest.approx([DIGITAL_LATE], abs=3e-4)
+
+
+@pytest.mark.parametrize("order", [4, 5])
+def test_a_filter_with_a_ripple_is_found_as_late_as_it_is(cases: Cases, order: int) -> None:
+    rippling = LoggerFilter("chebyshev", order, 90.0, 0.3)
+    found = filters.filtered(imported(cases.record(), lambda x: rippling.filtered(x, INTERVAL)))
+    assert len(set(found.passed.values())) <= 1
+    assert late(found) == pytest.approx([ImportedChannel(rippling).late], rel=0.05)
+
+
+def test_forces_and_other_readings_pass_one_filter_where_each_may() -> None:
+    read = SWING + 0.02 * white(61, SWING.size)
+    laboratories = [
+        filters.AlikeReadings(role, ("a",), demanded(np.interp(TICKS - LATE, TICKS, read), SWING))
+        for role in ("master", "slave")
+    ]
+    near, far = (ImportedChannel(delay=factor * LATE) for factor in (1.02, 0.5))
+    true, other = filters.Common(ImportedChannel(delay=LATE), (laboratories[0],)), (laboratories[1],)
+    agreed = filters.alike(true, filters.Common(near, other))
+    assert agreed[0].channel == agreed[1].channel
+    apart = filters.alike(true, filters.Common(far, other))
+    assert apart[0].channel == apart[1].channel == true.channel  # which is likelier for both
+    assert filters.alike(true, filters.Common()) == (true, filters.Common())
+
+
+def test_rows_that_are_missing_make_no_filter(cases: Cases) -> None:
+    record = imported(cases.record())
+    gap = (5.0, 5.25)
+    inside = (record.time > gap[0]) & (record.time < gap[1])
+    places = np.flatnonzero(~inside)
+    signals = {
+        name: np.interp(record.time, record.time[places], values[places])
+        for name, values in record.signals.items()
+        if values.ndim == 1
+    }
+    stated = replace(record.mapped or ImportedData(""), gaps=(gap,)).metadata()
+    run = replace(record.run, metadata=record.run.metadata | {IMPORT: stated})
+    present = {name: there & ~inside for name, there in record.present.items()}
+    gapped = replace(record, signals=record.signals | signals, present=present, run=run)
+    assert gapped.gapped
+    found = filters.filtered(gapped)
+    assert (found.passed, found.late) == ({}, NOT_LATE)
 
 
 def test_a_laboratory_with_an_effect_does_not_hide_a_filter(cases: Cases) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from diagnosis.diagnose import verdict_on
 from diagnosis.findings.certainty.intervals import intervals, refined, spread
+from diagnosis.findings.logged.building import verdict_on
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.scales import Scales

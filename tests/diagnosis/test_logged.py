@@ -14,11 +14,11 @@ from scipy import signal
 
 from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, LoggerFilter
 from common.roles import MASTER
-from diagnosis.diagnose import own_noise, verdict_on, verdict_over_longer
 from diagnosis.findings import gaps, how_far, report, verdict
 from diagnosis.findings.certainty import costs, trust
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.logger import by_building
+from diagnosis.findings.logged.building import own_noise, verdict_on, verdict_over_longer
+from diagnosis.findings.logged.logger import by_building
 from diagnosis.fits import fitting, hypothesis, residuals, settling, worth
 from diagnosis.fits.residuals import over_longer
 from diagnosis.fits.scales import Scales
@@ -250,7 +250,9 @@ def test_noise_that_only_the_controller_read_is_no_fault_of_the_building(cases: 
     )
     view, scales = logged(unread), Scales(unread)
     assert verdict.judge(search(view, scales)).outcome == "unknown"
-    assert verdict_on(residuals.prepare(Building(unread), unread), scales, view).outcome == "none"
+    found = verdict_on(residuals.prepare(Building(unread), unread), scales, view)
+    assert found.outcome == "none"
+    assert not found.search.chosen.z.any()  # no parameter moves to make that noise smaller
     heavier = cases.record({"structure.mass": {"factor": 1.1}})
     assert verdict_over_longer(logged(heavier), scales) is None
 

@@ -13,7 +13,7 @@ from scipy import signal
 from common.recording.imported import IMPORT, LoggerFilter
 from common.roles import MASTER
 from diagnosis.diagnose import diagnose
-from diagnosis.findings import logger
+from diagnosis.findings.logged import logger
 from diagnosis.fits import residuals
 from diagnosis.fits.fitting import fit
 from diagnosis.fits.scales import Scales

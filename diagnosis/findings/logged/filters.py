@@ -24,6 +24,7 @@ from diagnosis.recorded.parts import Building, LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Delay, Late, Record
 from diagnosis.signals import low_pass
 from diagnosis.signals.low_pass import ReadSpectra
+from diagnosis.signals.mask import Mask
 
 # Share of a reading's rms that a nominal model leaves, from which on an effect is at work: noise, a hum of 1 % of the
 # peak and a converter together leave up to 4 %.
@@ -81,8 +82,10 @@ def filtered(record: Record) -> Record:
         return record
     record = in_time(record)
     parts, labs = parts_of(record), unstated(record)
-    forces = of_forces(of_laboratories(record, labs, force=True), of_building(record, parts))
-    others = in_common(of_laboratories(record, labs, force=False), forces.channel)
+    reading_forces, reading_others = (of_laboratories(record, labs, force=force) for force in (True, False))
+    forces, others = of_forces(reading_forces, of_building(record, parts)), in_common(reading_others)
+    forces, others = followed(others, forces, reading_forces), followed(forces, others, reading_others)
+    forces, others = alike(forces, others)
     late = Late(Delay(forces.channel.delay), Delay(others.channel.delay))
     return replace(record, passed=by_channel(forces, others), late=late)
 
@@ -134,22 +137,63 @@ def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> 
     """The filter of forces: of those that the master used, or of the laboratories that agree on one.
 
     Each of `exact` is a way to see the forces that the master used, by the motion of the building; the likeliest way
-    counts. Its filter is also that of the laboratories whose forces are about as likely behind it.
+    counts. It tells the filter of the master's own converter apart, and whether both laboratories err alike, but a
+    filter that laboratories agree on less surely than they do: where it is about as likely behind theirs, theirs holds.
     """
+    agreed = in_common(labs)
     tried = [(low_pass.roughly(one.spectra), one) for one in exact]
     first, own = min(tried, key=lambda item: item[0].surprise, default=(None, None))
     if first is None or own is None or first.gain < BEYOND:
-        return in_common(labs)
+        return agreed
     channel = low_pass.likeliest(own.spectra, first.late, BEYOND)
     said = low_pass.surprise(own.spectra, channel)
     if low_pass.missed(own.spectra, channel) > SPOILT or low_pass.surprise_unknown(own.spectra) < said:
-        return in_common(labs)  # something is at work in the building
-    agreed = passed(labs, channel)
-    return agreed if channel.filter is None else Common(channel, (own, *agreed.by))
+        return agreed  # something is at work in the building
+    if not (agreed.by and LikelyFilter(channel, own.gain(channel), own).allows(agreed.channel)):
+        agreed = passed(labs, channel)
+        return agreed if channel.filter is None else Common(channel, (own, *agreed.by))
+    return agreed if agreed.channel.filter is None else agreed._replace(by=(own, *agreed.by))
 
 
-def in_common(labs: Sequence[AlikeReadings], known: ImportedChannel = NOTHING_STATED) -> Common:
-    """The filter or delay that readings of several laboratories passed, the one `known` where that is as likely.
+def followed(known: Common, found: Common, labs: Sequence[AlikeReadings]) -> Common:
+    """The filter `found` of a group of readings; where there is none that `known` of the other group, as likely.
+
+    It is so where one laboratory's readings say the same by themselves. Another laboratory speaks against it only if
+    its nominal model fits, as an effect may make its readings come earlier by as much.
+    """
+    if found.channel.late > 0.0 or known.channel.late == 0.0:
+        return found
+    own = [(low_pass.roughly(one.spectra), one) for one in labs]
+    agreeing = [
+        LikelyFilter(low_pass.likeliest(one.spectra, said.late, BEYOND), said.gain, one).allows(known.channel)
+        for said, one in own
+        if said.gain > BEYOND
+    ]
+    against = [
+        one
+        for one in labs
+        if one.gain(known.channel) < -BEYOND and low_pass.missed(one.spectra, NOTHING_STATED) < SPOILT
+    ]
+    return Common(known.channel, tuple(labs)) if any(agreeing) and not against else found
+
+
+def alike(*groups: Common) -> tuple[Common, ...]:
+    """The same groups of readings behind one filter or delay, where that of one of them is about as likely for each.
+
+    Of several such it is the likeliest one for all readings together: loggers mostly treat all channels alike.
+    """
+    found = [
+        LikelyFilter(group.channel, one.gain(group.channel), one) for group in groups for one in group.by
+    ]
+    if not all(group.by for group in groups):
+        return groups
+    shared = [group.channel for group in groups if all(one.allows(group.channel) for one in found)]
+    best = max(shared, key=lambda channel: sum(one.of.gain(channel) for one in found), default=None)
+    return groups if best is None else tuple(group._replace(channel=best) for group in groups)
+
+
+def in_common(labs: Sequence[AlikeReadings]) -> Common:
+    """The filter or delay that readings of several laboratories passed.
 
     The laboratory decides that knows it best, unless it is less likely in one that is late less: what is like a filter
     in a laboratory makes its readings later still. One that its nominal model misses by far tells nothing of it, as
@@ -165,8 +209,7 @@ def in_common(labs: Sequence[AlikeReadings], known: ImportedChannel = NOTHING_ST
         return Common()
     sure = sorted([item for item in sure if item.missed < SPOILT] or sure, key=lambda item: -item.gain)
     chosen = next(one for one in sure if one.spoken_for(sure))
-    channel = known if known.filter and chosen.allows(known) else chosen.channel
-    return passed(labs, channel)
+    return passed(labs, chosen.channel)
 
 
 def passed(labs: Sequence[AlikeReadings], channel: ImportedChannel) -> Common:
@@ -219,18 +262,30 @@ def of_laboratory(record: Record, part: LaboratoryPart, *, force: bool | None) -
         for place, (signal, name, span) in enumerate(rows)
         if force in (None, record.unit(signal) == "N")
         and record.has(signal)
+        and part.present[:, place].any()
         and span > 0.0
         and place != part.freed
     }
-    if not there:
-        return None
     system, places = record.systems[part.role], list(there)
-    true = part.predict(system)[:, places]
-    slopes = [part.predict(one.moved(system, 1.0))[:, places] - true for one in part.nuisances]
+    known = longest(np.all(part.present[:, places], axis=1)) if record.gapped else slice(None)
+    if not there or len(part.measured[known]) < LEAST_TICKS:
+        return None
+    true = part.predict(system)[known][:, places]
+    slopes = [part.predict(one.moved(system, 1.0))[known][:, places] - true for one in part.nuisances]
     slopes += [ANY_GAIN * true * (np.arange(len(places)) == own) for own in range(len(places))]
-    interval, read = record.plan.test.interval, part.measured[:, places]
+    interval, read = record.plan.test.interval, part.measured[known][:, places]
     spectra = low_pass.spectra(read, true, np.stack(slopes, axis=2), interval)
     return AlikeReadings(part.role, tuple(there.values()), spectra)
+
+
+def longest(known: Mask) -> slice:
+    """The longest stretch of ticks (ticks,) at which something is known."""
+    ends = np.flatnonzero(np.diff(np.r_[False, known, False].astype(int)))
+    begins, behind = ends[::2], ends[1::2]
+    if not begins.size:
+        return slice(0)
+    place = int(np.argmax(behind - begins))
+    return slice(int(begins[place]), int(behind[place]))
 
 
 def of_building(record: Record, parts: Sequence[Part]) -> list[AlikeReadings]:
@@ -238,10 +293,12 @@ def of_building(record: Record, parts: Sequence[Part]) -> list[AlikeReadings]:
 
     What the master's own converter added to a force is in the motion as well, and in no reading of a logger.
     The first is missing where what was recorded of the other forces is not what the master used.
-    Empty where the import map states a filter or delay of what goes into it.
+    Empty where the import map states a filter or delay of what goes into it, or rows are missing.
     """
     found = next((part for part in parts if isinstance(part, Building)), None)
-    if found is None or not (found.whole and found.linear and found.sources) or found.treated:
+    if found is None or not (found.whole and found.linear and found.sources):
+        return []
+    if found.treated or record.gapped:
         return []
     interval, view = record.plan.test.interval, LoggedBuilding(found)
     own, every = (

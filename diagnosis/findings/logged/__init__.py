@@ -1,0 +1,1 @@
+"""What the data logger of an import did to readings, and a building whose forces it recorded."""

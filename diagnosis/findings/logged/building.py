@@ -1,0 +1,77 @@
+"""The verdict on a building: exact where the master used the forces recorded, else by the balance of its forces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.findings.verdict import UNNAMED, WITHOUT_GAP, PartVerdict, judge
+from diagnosis.fits import fitting, residuals
+from diagnosis.fits.residuals import Data
+from diagnosis.fits.scales import Scales
+from diagnosis.fits.search import search
+from diagnosis.recorded.logged_building import LoggedBuilding, logged
+from diagnosis.recorded.parts import Building, Part
+from diagnosis.recorded.record import Record
+
+# Ratio of the noise in a balance of forces to that of the forces used, from which on a logger caused it.
+# A wrong mass gives a smaller ratio.
+OTHERS = 0.7
+# Share of a balance's rms below which its content at the highest frequencies belongs to the motion.
+SMOOTH = 1e-5
+
+
+def other_view(part: Part, record: Record, steps: Mapping[str, float]) -> Data | None:
+    """A building as one whose forces a logger recorded, None for all else."""
+    view = logged(part) if isinstance(part, Building) else None
+    return None if view is None else residuals.prepare(view, record, view.rounded(steps))
+
+
+def verdict_on(data: Data, scales: Scales, view: Data | None = None) -> PartVerdict:
+    """The verdict on a part; a building that no effect makes exact is judged as one whose forces a logger recorded.
+
+    It is so from the start where the forces recorded have noise that those used had not.
+    """
+    if view is None or not own_noise(view):
+        verdict = judge(search(data, scales))
+        if view is None or verdict.outcome not in UNNAMED:
+            return verdict
+    return as_planned(verdict_over_longer(view, scales) or judge(search(view, scales)))
+
+
+def as_planned(verdict: PartVerdict) -> PartVerdict:
+    """The verdict on a building of which the plan's parameters leave nothing, with these in place of those fitted.
+
+    Fitted ones move by tolerances to make noise smaller that the controller read and the log does not show.
+    """
+    if verdict.outcome != "none":
+        return verdict
+    data = verdict.search.data
+    planned = fitting.at(data, {}, np.zeros(verdict.search.chosen.z.size))
+    return replace(verdict, search=replace(verdict.search, chosen=planned))
+
+
+def verdict_over_longer(view: Data, scales: Scales) -> PartVerdict | None:
+    """The verdict on a building's balance over longer averages where these show no gap, else None.
+
+    What its parameters or forces do shows over these as well. Noise that only the controller read does not: over
+    shorter ones it shrinks with the building's parameters, which move by tolerances for that.
+    """
+    part = view.part
+    longer = residuals.over_longer(view, part) if isinstance(part, LoggedBuilding) else None
+    verdict = None if longer is None else judge(search(longer, scales))
+    return verdict if verdict and verdict.outcome in WITHOUT_GAP else None
+
+
+def own_noise(data: Data) -> bool:
+    """Whether the balance of a building's forces has noise that its motion, and so the forces used, did not have.
+
+    Forces that lie behind a filter or delay of the logger are not those used, whatever their noise.
+    """
+    if isinstance(data.part, LoggedBuilding) and data.part.behind:
+        return True
+    used = residuals.noise(data.part.measured)
+    least = SMOOTH * np.sqrt(np.mean(np.square(data.part.measured), axis=0))
+    return bool(np.any(data.white > np.maximum(OTHERS * used, least)))
