@@ -10,12 +10,13 @@ from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.search import Search
 from diagnosis.fits.unexplained import foresees, model_error
-from diagnosis.recorded.joined import laboratory_of
+from diagnosis.recorded.joined import column_of, laboratory_of
 from diagnosis.recorded.parts import MODEL_ERROR
 
 # Probability of several effects of which one unknown cause may look the same, over that without: half, as one cause is
 # no less likely than two.
 EITHER = 0.5
+FORGOTTEN = 3.0  # time constants, within which a high-pass has forgotten 95 %
 
 
 def other_causes(search: Search) -> Iterator[str]:
@@ -40,6 +41,11 @@ def other_causes(search: Search) -> Iterator[str]:
             f"With {name} the column gives more energy than it ever took, since its force falls later than it rises. "
             "Hysteresis of its load cell looks the same: these signals cannot tell them apart."
         )
+    if name := may_relax(fit):
+        yield (
+            f"With {name} the load cell has not forgotten a force by the end of the recording. A specimen that relaxes "
+            "may look the same: these signals cannot tell them apart."
+        )
     if loop := loop_of_several(search):
         yield (
             f"Several values of the plan are named of the {loop}. One other part of its loop, such as a filter in its "
@@ -55,6 +61,19 @@ def other_causes(search: Search) -> Iterator[str]:
             f"The offsets of {described(fit)} follow from one another as where a machine stands elsewhere, such as "
             "behind a valve that opens later on one side: these signals cannot tell them apart."
         )
+
+
+def may_relax(fit: Fit) -> str:
+    """The high-pass of a specimen's force that is too slow for the recording to show how it ends, empty for none.
+
+    A cell whose charge leaks forgets the whole of a force, and a specimen that relaxes a part of it.
+    """
+    part = column_of(fit.data.part)
+    if part is None:
+        return ""
+    name = f"{part.lab.sensor(part.lab.kind.channels.force)}.high_pass"
+    lasts = fit.data.system.plan.test.interval * len(part.measured)
+    return name if name in fit.values and FORGOTTEN * fit.values[name]["time_constant"] > lasts else ""
 
 
 def loop_of_several(search: Search) -> str:
