@@ -83,7 +83,10 @@ def filtered(record: Record) -> Record:
     record = in_time(record)
     parts, labs = parts_of(record), unstated(record)
     reading_forces, reading_others = (of_laboratories(record, labs, force=force) for force in (True, False))
-    forces, others = of_forces(reading_forces, of_building(record, parts)), in_common(reading_others)
+    forces, others = (
+        of_forces(reading_forces, of_building(record, parts)),
+        in_common(reading_others, likely(reading_others)),
+    )
     forces, others = followed(others, forces, reading_forces), followed(forces, others, reading_others)
     forces, others = alike(forces, others)
     late = Late(Delay(forces.channel.delay), Delay(others.channel.delay))
@@ -137,10 +140,11 @@ def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> 
     """The filter of forces: of those that the master used, or of the laboratories that agree on one.
 
     Each of `exact` is a way to see the forces that the master used, by the motion of the building; the likeliest way
-    counts. It tells the filter of the master's own converter apart, and whether both laboratories err alike, but a
-    filter that laboratories agree on less surely than they do: where it is about as likely behind theirs, theirs holds.
+    counts. It tells the filter of the master's own converter apart, and which laboratory has an effect, but a filter
+    that all laboratories agree on less surely than they do: where none of them allows what it says, and it allows what
+    they say, theirs holds.
     """
-    agreed = in_common(labs)
+    agreed = in_common(labs, sure := likely(labs))
     tried = [(low_pass.roughly(one.spectra), one) for one in exact]
     first, own = min(tried, key=lambda item: item[0].surprise, default=(None, None))
     if first is None or own is None or first.gain < BEYOND:
@@ -149,7 +153,8 @@ def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> 
     said = low_pass.surprise(own.spectra, channel)
     if low_pass.missed(own.spectra, channel) > SPOILT or low_pass.surprise_unknown(own.spectra) < said:
         return agreed  # something is at work in the building
-    if not (agreed.by and LikelyFilter(channel, own.gain(channel), own).allows(agreed.channel)):
+    apart = not any(one.allows(channel) for one in sure)
+    if not (apart and agreed.by and LikelyFilter(channel, own.gain(channel), own).allows(agreed.channel)):
         agreed = passed(labs, channel)
         return agreed if channel.filter is None else Common(channel, (own, *agreed.by))
     return agreed if agreed.channel.filter is None else agreed._replace(by=(own, *agreed.by))
@@ -163,18 +168,13 @@ def followed(known: Common, found: Common, labs: Sequence[AlikeReadings]) -> Com
     """
     if found.channel.late > 0.0 or known.channel.late == 0.0:
         return found
-    own = [(low_pass.roughly(one.spectra), one) for one in labs]
-    agreeing = [
-        LikelyFilter(low_pass.likeliest(one.spectra, said.late, BEYOND), said.gain, one).allows(known.channel)
-        for said, one in own
-        if said.gain > BEYOND
-    ]
+    agreeing = any(one.allows(known.channel) for one in likely(labs))
     against = [
         one
         for one in labs
         if one.gain(known.channel) < -BEYOND and low_pass.missed(one.spectra, NOTHING_STATED) < SPOILT
     ]
-    return Common(known.channel, tuple(labs)) if any(agreeing) and not against else found
+    return Common(known.channel, tuple(labs)) if agreeing and not against else found
 
 
 def alike(*groups: Common) -> tuple[Common, ...]:
@@ -192,19 +192,23 @@ def alike(*groups: Common) -> tuple[Common, ...]:
     return groups if best is None else tuple(group._replace(channel=best) for group in groups)
 
 
-def in_common(labs: Sequence[AlikeReadings]) -> Common:
-    """The filter or delay that readings of several laboratories passed.
+def likely(labs: Sequence[AlikeReadings]) -> list[LikelyFilter]:
+    """The filter or delay of each laboratory whose readings are far likelier behind one."""
+    said = [(low_pass.roughly(one.spectra), one) for one in labs]
+    return [
+        LikelyFilter(low_pass.likeliest(one.spectra, item.late, BEYOND), item.gain, one)
+        for item, one in said
+        if item.gain > BEYOND
+    ]
+
+
+def in_common(labs: Sequence[AlikeReadings], sure: Sequence[LikelyFilter]) -> Common:
+    """The filter or delay that readings of several laboratories passed, by what is `likely` of each.
 
     The laboratory decides that knows it best, unless it is less likely in one that is late less: what is like a filter
     in a laboratory makes its readings later still. One that its nominal model misses by far tells nothing of it, as
     long as another one does.
     """
-    said = [(low_pass.roughly(one.spectra), one) for one in labs]
-    sure = [
-        LikelyFilter(low_pass.likeliest(one.spectra, item.late, BEYOND), item.gain, one)
-        for item, one in said
-        if item.gain > BEYOND
-    ]
     if len(sure) < 2:
         return Common()
     sure = sorted([item for item in sure if item.missed < SPOILT] or sure, key=lambda item: -item.gain)
