@@ -104,7 +104,7 @@ def show(
             "link": "judged" if judged else UNJUDGED,
             "units": found.units,
             "gaps": found.gaps,
-            "ground": unread or "read",
+            "ground_unread": unread,
             "text": form and form._asdict(),
         }
         say(json.dumps(report) + "\n")

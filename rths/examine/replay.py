@@ -82,10 +82,15 @@ def planned(recording: Run, place: str | None = None) -> Plan:
     """The whole plan in a recording; files of users' kinds are beside the recording, or beside the plan at `place`.
 
     Raises:
-        InputError: the recording holds no plan, or one that cannot be read.
+        InputError: the recording was imported, or holds no plan, or one that cannot be read.
     """
+    from common.recording.imported import imported
     from report.facts.laboratories import whole_plan
 
+    if imported(recording) is not None:
+        raise InputError(
+            f"{recording.path} cannot be replayed: it was imported, so that rths did not compute its signals."
+        )
     plan = whole_plan(recording)
     if plan is None or not recording.has(MASTER):
         raise InputError(f"{recording.path} cannot be replayed: it lacks the plan or the master's signals.")

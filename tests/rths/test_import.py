@@ -346,7 +346,9 @@ BUILDING = 'ground_acceleration = { column = "a" }\ndisplacement = { column = "x
 STRONG = np.sin(2.0 * np.pi * TIMES) * (TIMES < 3.0)  # m/s²
 
 
-def test_a_whole_test_keeps_the_ground_motion_of_its_plan(bring: Any, tmp_path: Path) -> None:
+def test_a_whole_test_keeps_the_ground_motion_of_its_plan(
+    bring: Any, call: Any, capsys: Any, tmp_path: Path
+) -> None:
     away = tmp_path / "away"
     away.mkdir()
     (tmp_path / "motion.csv").write_text(table("time (s),acceleration (m/s2)", TIMES, 0.5 * STRONG))
@@ -357,6 +359,8 @@ def test_a_whole_test_keeps_the_ground_motion_of_its_plan(bring: Any, tmp_path: 
     assert ground is not None
     assert ground[0, : TIMES.size] == pytest.approx(STRONG, abs=1e-8)
     assert run.metadata["ground_motion"]["scale"] == "2.0"
+    assert call("replay", moved) == 2
+    assert "cannot be replayed: it was imported" in capsys.readouterr().err
 
 
 def test_a_ground_motion_that_cannot_be_read_is_said_at_import(bring: Any, capsys: Any) -> None:
