@@ -60,7 +60,7 @@ ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth
     ("column.hardening", {"share": -0.05}, {"share": 0.1}),
     ("sensor.column_displacement.gain", {"factor": 1.08}, {"factor": 0.02}),
     ("sensor.column_force.saturation", {"limit": 5e4}, {"limit": 0.1}),
-    ("sensor.column_force.high_pass", {"time_constant": 2.0}, {"time_constant": 0.05}),
+    ("sensor.column_force.high_pass", {"time_constant": 1.0}, {"time_constant": 0.05}),
     ("sensor.table_acceleration.high_pass", {"time_constant": 0.5}, {"time_constant": 0.05}),
 ]
 RARE = ("table.backlash",)  # the platform meets a flank seldom
