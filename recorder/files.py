@@ -25,9 +25,8 @@ from laboratories.kinds import topics
 from models.ground_motion import GroundMotion
 from models.registry import Array
 
-MotionRows = tuple[
-    GroundMotion, Array
-]  # a plan's record, and its rows as `loop.substructure.ground_rows` gives them
+# The record of a plan's ground motion, and its rows as `loop.substructure.ground_rows` gives them.
+MotionRows = tuple[GroundMotion, Array]
 PACKAGES = ("rths", "eclipse-zenoh", "mcap", "msgpack", "numba", "numpy", "protobuf", "scipy")
 
 
