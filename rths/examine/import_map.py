@@ -254,8 +254,13 @@ def stated(apart: dict[str, Any], row: Signal, where: str) -> tuple[float, Logge
         apart["filter"], f"{where}.filter", '{ type = "butterworth", order = 4, cutoff = 100.0 }'
     )
     found = fill(FilterTable, low_pass, f"{where}.filter")
-    ripple = found.ripple if found.type in RIPPLING else 0.0
-    attenuation = found.attenuation if found.type == "elliptic" else 0.0
+    of_kind = {"ripple": RIPPLING, "attenuation": RIPPLING[1:]}
+    for name, kinds in of_kind.items():
+        if name in low_pass and found.type not in kinds:
+            raise PlanError(
+                f"{name} in [{where}.filter] belongs to a filter of type {' or '.join(kinds)} only."
+            )
+    ripple, attenuation = (getattr(found, name) * (found.type in kinds) for name, kinds in of_kind.items())
     return step, LoggerFilter(found.type, found.order, found.cutoff, ripple, attenuation)
 
 

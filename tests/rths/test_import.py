@@ -306,6 +306,11 @@ WRONG = {
         "",
         "ripple",
     ),
+    "ripple of a Bessel filter": (
+        'x = { column = "u", filter = { type = "bessel", order = 4, cutoff = 80.0, ripple = 0.5 } }',
+        "",
+        "ripple in [signals.actuator_command.filter] belongs to a filter of type chebyshev or elliptic only",
+    ),
     "negative resolution": ('x = { column = "u", resolution = -1.0 }', "", "at least 0"),
     "stop before start": ('x = { column = "u" }', "start = 3.0\nstop = 2.0\n", "must be after start"),
     "no rows": ('x = { column = "u" }', "start = 30.0\n", "fewer than two rows"),
