@@ -115,20 +115,6 @@ def test_a_small_error_of_a_load_cell_is_the_law_of_its_specimen(
     )  # a law of the specimen and what its load cell makes of it
 
 
-@pytest.mark.parametrize(("time_constant", "relaxes"), [(1.0, False), (6.0, True)])
-def test_a_load_cell_that_leaks_for_longer_than_the_test_may_be_a_specimen_that_relaxes(
-    cases: Cases, time_constant: float, relaxes: bool
-) -> None:
-    effects = {"sensor.column_force.high_pass": {"time_constant": time_constant}}
-    whole = cases.record(effects, duration=8.0)
-    data = residuals.prepare(lab_a(whole), whole)
-    bare = fitting.fit(data, {})
-    found = Search(data, bare, fitting.at(data, effects, bare.z), ())
-    said = list(other_causes(found))
-    assert len(said) == relaxes
-    assert all("relaxes" in sentence for sentence in said)
-
-
 def test_errors_of_readings_that_leave_a_tenth_of_a_gap_are_not_its_cause() -> None:
     def search(left: float, name: str = "sensor.column_force.bias") -> Search:
         chosen = Fit(DATA, {name: {"offset": 3.0}}, np.zeros(0), NOISY + left * GAP)
