@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 import pytest
@@ -100,6 +100,61 @@ def test_forces_and_other_readings_pass_one_filter_where_each_may() -> None:
     apart = filters.alike(true, filters.Common(far, other))
     assert apart[0].channel == apart[1].channel == true.channel  # which is likelier for both
     assert filters.alike(true, filters.Common()) == (true, filters.Common())
+
+
+class Wanted(NamedTuple):
+    """Stands for spectra of a force that is likeliest behind one delay."""
+
+    late: float  # in units of LATE
+    sure: float  # by how much less surprising it is so than without a delay
+    missed: float = 0.0  # by its nominal model
+
+
+def surprise(of: Wanted, channel: ImportedChannel) -> float:
+    """That of a delay, which grows with the square of what it is off."""
+    return of.sure * (channel.late / LATE / of.late - 1.0) ** 2
+
+
+def readings(*wanted: Wanted) -> list[filters.AlikeReadings]:
+    """Those of laboratories, one each."""
+    return [filters.AlikeReadings("", (), cast(low_pass.ReadSpectra, one)) for one in wanted]
+
+
+@pytest.fixture
+def weighed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Likelihoods of what is wanted in place of those of spectra."""
+    stands = SimpleNamespace(
+        surprise=surprise,
+        roughly=lambda of: low_pass.Said(of.late * LATE, 0.0, of.sure),
+        likeliest=lambda of, *_: ImportedChannel(delay=of.late * LATE),
+        missed=lambda of, _: of.missed,
+        surprise_unknown=lambda _: np.inf,
+    )
+    monkeypatch.setattr(filters, "low_pass", stands)
+
+
+@pytest.mark.usefixtures("weighed")
+@pytest.mark.parametrize(
+    ("other", "said"), [(Wanted(0.1, 200.0, missed=0.06), 1.0), (Wanted(0.1, 200.0), 0.0)]
+)
+def test_other_readings_are_as_late_as_forces_unless_one_that_fits_speaks_against_it(
+    other: Wanted, said: float
+) -> None:
+    forces = filters.Common(ImportedChannel(delay=LATE), tuple(readings(Wanted(1.0, 100.0))))
+    found = filters.followed(forces, filters.Common(), readings(Wanted(1.02, 100.0), other))
+    assert found.channel.late == pytest.approx(said * LATE)
+    alone = filters.followed(forces, filters.Common(), readings(other._replace(sure=0.0)))
+    assert alone == filters.Common()  # no laboratory says the same
+
+
+@pytest.mark.usefixtures("weighed")
+@pytest.mark.parametrize(
+    ("master", "said"), [(Wanted(1.0, 50.0), 1.0), (Wanted(1.3, 5000.0), 1.3)], ids=["apart", "agree"]
+)
+def test_the_building_decides_where_a_laboratory_allows_its_delay(master: Wanted, said: float) -> None:
+    *laboratories, building = readings(master, Wanted(1.3, 5000.0), Wanted(1.0, 100.0))
+    found = filters.of_forces(laboratories, [building])
+    assert found.channel.late == pytest.approx(said * LATE)
 
 
 def test_rows_that_are_missing_make_no_filter(cases: Cases) -> None:
