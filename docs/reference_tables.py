@@ -144,12 +144,9 @@ def said(action: argparse.Action) -> str:
 def effects() -> str:
     """The catalogue by site; effects on readings once, as they exist for every signal."""
     texts = [f"## {site.capitalize()}\n\n{effect_table(of_site(site))}" for site in SITES if "." not in site]
-    some, signal = next(iter(SIGNALS.items()))
-    generic = (of_any_signal(one, some, signal.unit) for one in of_site(f"sensor.{some}"))
     names = ", ".join(f"`{name}`" for name in SIGNALS)
-    return "\n".join(
-        [*texts, f"## Sensors\n\n`<signal>` is one of {names}.\n\n{effect_table(generic, sized=False)}"]
-    )
+    table_ = effect_table(of_any_signal(), sized=False)
+    return "\n".join([*texts, f"## Sensors\n\n`<signal>` is one of {names}.\n\n{table_}"])
 
 
 def of_site(site: str) -> list[Effect]:
@@ -157,12 +154,29 @@ def of_site(site: str) -> list[Effect]:
     return [effect for effect in CATALOGUE.values() if effect.site == site]
 
 
-def of_any_signal(effect: Effect, signal: str, unit: str) -> Effect:
-    """An effect on one reading as the reference lists it for all: with `<signal>` and "its unit"."""
+def of_any_signal() -> list[Effect]:
+    """The effects on readings as the reference lists them for all: with `<signal>` and "its unit"."""
+    having: dict[str, list[tuple[str, Effect]]] = {}
+    for signal in SIGNALS:
+        for effect in of_site(f"sensor.{signal}"):
+            having.setdefault(effect.fault, []).append((signal, effect))
+    return [generic(found) for _, found in sorted(having.items())]
+
+
+def generic(found: Sequence[tuple[str, Effect]]) -> Effect:
+    """An effect on readings for all signals that can have it, with their names."""
+    signal, effect = found[0]
+    unit = SIGNALS[signal].unit
     units = {unit: "its unit", f"{unit}/s": "its unit/s"}
     parameters = (dataclasses.replace(item, unit=units.get(item.unit, item.unit)) for item in effect.every)
-    name = effect.name.replace(signal, "<signal>")
-    return dataclasses.replace(effect, name=name, parameters=tuple(parameters))
+    some = ", ".join(f"`{name}`" for name, _ in found)
+    return dataclasses.replace(
+        effect,
+        name=effect.name.replace(signal, "<signal>"),
+        says=effect.says + (f": {some}" if len(found) < len(SIGNALS) else ""),
+        parameters=tuple(parameters),
+        further=(),
+    )
 
 
 def effect_table(found: Iterable[Effect], *, sized: bool = True) -> str:
