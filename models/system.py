@@ -16,6 +16,7 @@ from common.plan.plan import Plan
 class ActuatorEffects:
     """Effects on an actuator, beyond the plan's model."""
 
+    lag_damping: float = math.inf  # ratio of a loop of second order, infinite for one of first order
     velocity_limit: float = math.inf  # m/s
     velocity_limit_sharpness: float = math.inf  # with which the speed bends at its limit
     stall_force: float = math.inf  # N, load at which the piston stands
@@ -147,6 +148,7 @@ class DamperEffects:
     force_limit: float = math.inf  # N
     force_limit_sharpness: float = math.inf  # of the bend there, as in `models.saturation`
     offset: float = 0.0  # N, a constant force on the moving mass
+    motor_damping: float = math.inf  # ratio of a motor of second order, infinite for one of first order
     asymmetry: float = 0.0  # share by which the dashpot is stronger in the positive direction
     second_frequency: float = math.inf  # Hz, of a share of the mass on the coupling that it lies behind
     second_mass: float = 0.2  # that share
@@ -169,6 +171,7 @@ class SensorEffects:
     bias: float = 0.0
     drift: float = 0.0  # per s
     lag: float = 0.0  # s
+    lag_damping: float = math.inf  # ratio of a lag of second order, infinite for one of first order
     high_pass: float = math.inf  # s
     quantization: float = 0.0
     noise: float = 0.0  # rms, in addition to the plan's

@@ -6,6 +6,7 @@ parameters give way is read off a linear projection; the most promising are then
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from diagnosis.fits import contact, fitting
 from diagnosis.fits.fitting import TIED, Fit, everywhere, excess
 from diagnosis.fits.hypothesis import Values
-from diagnosis.fits.laws.best import descended, in_best_laws, raced
+from diagnosis.fits.laws.best import begun, descended, in_best_laws, raced
 from diagnosis.fits.laws.loop import single
 from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.scales import Scales
@@ -174,14 +175,30 @@ def in_other_laws(fit: Fit) -> Fit:
 def alternatives(fit: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, ...]:
     """Fits in which one effect is exchanged for another, best first; `first` are those with one only."""
     if len(fit.names) < 2:
-        return tuple(item for item in first if item.names != fit.names)
+        others = [item for item in first if item.names != fit.names]
+        return tuple(
+            sorted([*others, *of_one_reading(fit, fit.names[0], others)], key=lambda item: item.cost)
+        )
     result: list[Fit] = []
     for name in single(fit):
         others = [item for item in extended(without(fit, name), scales, known=fit) if name not in item.names]
         if others and is_gap(fit) and excess(others[0]) < HOPELESS * excess(fit):
             others = under_further_laws(others)
-        result += others
+        result += [*others, *of_one_reading(fit, name, others)]
     return tuple(sorted(result, key=lambda item: item.cost))
+
+
+def of_one_reading(fit: Fit, name: str, others: Sequence[Fit]) -> list[Fit]:
+    """Of fits with a fault of a reading exchanged for another those under a further law, where they come as near.
+
+    Under its first law a lag is far from a delay; of second order it may do the same.
+    """
+    catalogue = fit.data.catalogue
+    signal = catalogue[name].signal
+    alike = [item for item in others if signal and catalogue[item.names[-1]].signal == signal]
+    starts = [start for item in alike for start in begun(item, modelled=False)]
+    found = each(lambda start: fitting.fit(start.data, start.values, start.z, STEPS), starts)
+    return [item for item in found if item.cost < fit.cost + TIED]
 
 
 def under_further_laws(fits: list[Fit]) -> list[Fit]:

@@ -16,7 +16,7 @@ from diagnosis.fits import candidates, fitting, worth
 from diagnosis.fits.fitting import TIED, Fit, excess
 from diagnosis.fits.hypothesis import Problem, left_out
 from diagnosis.fits.laws.afresh import afresh
-from diagnosis.fits.laws.best import descended, raced
+from diagnosis.fits.laws.best import ROUNDS, STEPS, begun, descended, fitted, raced
 from diagnosis.fits.laws.loop import of_one_loop, single
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.threads import each
@@ -100,6 +100,7 @@ def traded(
     follows = len(chosen.names) == 1 and excess(chosen) < FOLLOWED * excess(bare)
     if follows and worth.is_gap(chosen) and not chosen.data.part.exact:
         found += afresh(chosen, scales)
+    found += in_further_laws(chosen, first)
     if len(chosen.names) < most:
         found += parted(bare, chosen, scales)
         found += paired(bare, chosen, first, scales)
@@ -202,6 +203,20 @@ def released(fit: Fit, scales: Scales) -> list[Fit]:
         return []
     others = candidates.extended(fit, scales, count=TRIED, known=fit)
     return [item for item in others if tied(fit, item) and item.prior < fit.prior - PULLED]
+
+
+def in_further_laws(fit: Fit, first: Sequence[Fit]) -> list[Fit]:
+    """Single effects under further laws, of a fit that leaves nothing but has moved nominal parameters.
+
+    Those that are about as good under their first law: a lag of second order lies between a delay and a lag, and
+    nominal parameters make up for what either does not do. `first` are the fits with one effect.
+    """
+    if fit.prior < PULLED or leaves(fit):
+        return []
+    alike = [item for item in first if item.cost < fit.cost + APART]
+    starts = each(lambda item: begun(item, modelled=False), alike)
+    found = each(lambda item: fitted(item, STEPS, ROUNDS), [item for items in starts for item in items])
+    return [item for item in found if item.prior < fit.prior - PULLED]
 
 
 def two_for_one(fit: Fit, rivals: Sequence[Fit], scales: Scales, most: int) -> Fit:

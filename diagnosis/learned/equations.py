@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.signal import lfilter
 
 from common.plan.kinds import COLUMN, TABLE
 from diagnosis.fits import hypothesis
@@ -20,6 +19,7 @@ from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.systematic import systematic
+from laboratories.table import motor
 from loop import replay
 from models import friction, stops
 from models.registry import Array
@@ -172,14 +172,13 @@ def damper_force(system: System, stroke: Array, rate: Array, command: Array) -> 
     damper, effects = system.plan.damper, system.effects.damper
     level = (effects.force_limit, effects.force_limit_sharpness)
     wanted = np.vectorize(saturated, otypes=[float])(effects.gain * command, *level)
-    lag = damper.motor_time_constant
-    kept = float(np.exp(-system.plan.test.interval / lag)) if lag > 0.0 else 0.0
-    motor = lfilter([0.0, 1.0 - kept], [1.0, -kept], wanted)
+    interval, lag = system.plan.test.interval, damper.motor_time_constant
+    pushed = motor.states(wanted, interval, lag, effects.motor_damping)[motor.FORCE]
     shape = (effects.stop_stroke, effects.stop_stiffness, effects.stop_exponent, effects.stop_damping)
     stopped = np.vectorize(stops.force, otypes=[float])(stroke, rate, *shape)
     rubbing = bristles_of(effects, stroke) if effects.presliding else friction_of(effects, rate)
     beside: Array = stopped + rubbing - effects.offset
-    return damper.stiffness * stroke + damper.damping * rate + beside - motor
+    return damper.stiffness * stroke + damper.damping * rate + beside - pushed
 
 
 def of_specimen(site: str, system: System, motion: Array, force: Array, there: Mask) -> Equation:

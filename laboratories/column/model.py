@@ -1,9 +1,9 @@
 """The laboratory of the kind column: a hydraulic actuator deforms a specimen.
 
-The actuator is a first-order lag with dead time, whose motion does not depend on the specimen, or servo-hydraulics
-whose force moves the specimen's mass. Effects apply to either: valve overlap removes small errors of the loop, the flow
-of the valve limits the piston's velocity, and oil and frame are compliant under load; the lag may also have play in its
-clevis or before its loop. A law learned from a recording adds to the motion of the lag.
+The actuator is a lag with dead time, whose motion does not depend on the specimen, or servo-hydraulics whose force
+moves the specimen's mass. Effects apply to either: valve overlap removes small errors of the loop, the flow of the
+valve limits the piston's velocity, and oil and frame are compliant under load; the lag may also be of second order, and
+have play in its clevis or before its loop. A law learned from a recording adds to the motion of the lag.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from models.compiled import jit
 from models.registry import Array
 from models.saturation import saturated
 from models.system import ActuatorEffects, ColumnEffects
-from models.transfer_systems import delay, first_order, servo_hydraulic
+from models.transfer_systems import delay, second_order, servo_hydraulic
 
 # s, longest step with an effect that is not linear over an interval: an eighth of 2 ms, in which the signals of a test
 # (below 20 Hz) turn by less than 2°
@@ -34,8 +34,8 @@ FINE_SUBSTEP = 0.05e-3
 SETTLING = 1.0  # s, in which `begin` ramps servo-hydraulics to a command, and in which they then settle
 
 # places in `state`: the lag's piston before compliance and play m, specimen m, load cell N, command behind a play
-# before the loop m, piston from specimen within a greased play m, states of servo-hydraulics
-SERVO, DISPLACEMENT, FORCE, PLAYED, LOOSE, STATES = range(6)
+# before the loop m, piston from specimen within a greased play m, the lag's speed m/s, states of servo-hydraulics
+SERVO, DISPLACEMENT, FORCE, PLAYED, LOOSE, SERVO_RATE, STATES = range(7)
 
 # places in `limits`; for servo-hydraulics GAIN is that of the command, and VELOCITY_LIMIT is given as a flow
 PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, HYDRAULIC, BEYOND, BEFORE = (
@@ -83,7 +83,9 @@ def build(
     segments = delay.split(
         interval, actuator.delay, substeps(interval) if short else 1, held=actuator.command == "held"
     )
-    rows = first_order.propagators(actuator.gain, actuator.time_constant, segments.lengths)
+    rows = second_order.propagators(
+        actuator.gain, actuator.time_constant, on_actuator.lag_damping, segments.lengths
+    )
     before, behind = plays(on_actuator)
     behind_loop, within = compliances(on_actuator)
     limits = [float(present), on_actuator.velocity_limit, behind, behind_loop]
@@ -209,7 +211,7 @@ def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
     taps, rows, lengths, limits, state = lab.taps, lab.rows, lab.lengths, lab.limits, lab.state
     history, tested, cell = lab.history, lab.specimen, lab.specimen.cell
     delay.remember(history, command)
-    servo, displacement, force = state[SERVO], state[DISPLACEMENT], state[FORCE]
+    displacement, force = state[DISPLACEMENT], state[FORCE]
     reached = displacement
     half = 0.5 * limits[BEFORE]
     before = state[PLAYED] if half > 0.0 else delay.delayed(history, taps, 0)
@@ -230,30 +232,43 @@ def advance(lab: ColumnLab, command: float) -> tuple[float, float]:
             if limits[BEYOND] != 0.0:
                 specimen.force(tested, displacement, lengths[i])
         else:
-            ahead = first_order.step(rows[i], servo, before, after)
-            if limits[PRESENT] != 0.0:
-                middle = 0.5 * (before + after)
-                if limits[LOAD] > 0.0:
-                    ahead = under_load(rows[i], limits, ahead, servo, cell[REACTION])
-                    pull = cell[REACTION] + 0.5 * limits[STIFFNESS] * (ahead - servo)
-                    middle -= limits[LOAD] * pull / limits[GAIN]
-                servo += limited(limits, ahead - servo, middle, servo, cell[REACTION], lengths[i])
-                displacement = loaded(limits, state, servo, displacement, cell[REACTION], lengths[i])
-            else:
-                servo = ahead
-                displacement = ahead
+            displacement = lagged(lab, i, before, after, displacement)
             reached = displacement
             if lab.learned.size > 0:
-                rate = (displacement - state[DISPLACEMENT]) / lengths[i]
+                way = (displacement - state[DISPLACEMENT]) / lengths[i]
                 state[DISPLACEMENT] = displacement
-                reached += preisach.step(lab.learned, lab.learned_memory, displacement, rate)
+                reached += preisach.step(lab.learned, lab.learned_memory, displacement, way)
             force = specimen.force(tested, reached, lengths[i])
         before = after
     state[PLAYED] = before
-    state[SERVO] = servo
     state[DISPLACEMENT] = displacement
     state[FORCE] = force
     return reached, force
+
+
+@jit
+def lagged(lab: ColumnLab, i: int, before: float, after: float, displacement: float) -> float:
+    """Deformation of the specimen (m) behind the lag at the end of segment `i`, from that at its beginning.
+
+    The command (m) moves from `before` to `after`. It updates the piston's place and speed.
+    """
+    row, limits, state, length = lab.rows[i], lab.limits, lab.state, lab.lengths[i]
+    servo, rate, reaction = state[SERVO], state[SERVO_RATE], lab.specimen.cell[REACTION]
+    free = second_order.step(row, second_order.OUTPUT, servo, rate, before, after)
+    state[SERVO_RATE] = second_order.step(row, second_order.RATE, servo, rate, before, after)
+    if limits[PRESENT] == 0.0:
+        state[SERVO] = free
+        return free
+    middle, ahead = 0.5 * (before + after), free
+    if limits[LOAD] > 0.0:
+        ahead = under_load(row, limits, ahead, servo, reaction)
+        pull = reaction + 0.5 * limits[STIFFNESS] * (ahead - servo)
+        middle -= limits[LOAD] * pull / limits[GAIN]
+    moved = limited(limits, ahead - servo, middle, servo, reaction, length)
+    if moved != free - servo:
+        state[SERVO_RATE] = moved / length
+    state[SERVO] = servo + moved
+    return loaded(limits, state, servo + moved, displacement, reaction, length)
 
 
 @jit

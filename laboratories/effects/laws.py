@@ -112,6 +112,20 @@ def which_law(most: float, says: str) -> Parameter:
     return Parameter("law", "", null=0.0, least=0.0, most=most, sizes=(), says=says, shape=True)
 
 
+def of_second_order() -> Parameter:
+    """The shape `damping` of a lag T of second order: its damping ratio ζ in (T/2ζ)²·ÿ + T·ẏ + y = x."""
+    return Parameter(
+        "damping",
+        "",
+        null=math.inf,
+        least=0.2,
+        most=2.0,
+        sizes=(0.7,),
+        says="ratio of the loop of law 1, with which its time constant is 2ζ/ω",
+        shape=True,
+    )
+
+
 def bend_sharpness(says: str) -> Parameter:
     """The shape `sharpness` n of a limit L that a machine reaches gradually, by x/(1 + |x/L|ⁿ)^(1/n); inf: suddenly."""
     return Parameter(

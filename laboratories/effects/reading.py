@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
-from laboratories.effects.effect import Effect, Parameter
+from laboratories.effects.effect import Effect, Law, Parameter
 from models.system import SensorEffects, System
 
 
@@ -53,6 +53,9 @@ class ReadingFault:
     units: tuple[str, ...] = ()  # of the readings that can have it, empty for any
     # parameters of shape, by the field of `SensorEffects` that each sets
     shapes: Mapping[str, Parameter] = field(default_factory=dict)
+    # optional parameters, by the field that each sets, and the formulas that they choose, as in `Effect`
+    further: Mapping[str, Parameter] = field(default_factory=dict)
+    laws: tuple[Law, ...] = ()
 
     def can_be_on(self, signal: SensorSignal) -> bool:
         """Whether a reading of that unit can have it."""
@@ -61,7 +64,8 @@ class ReadingFault:
     def on(self, name: str, signal: SensorSignal) -> Effect:
         """The effect on the reading of that name."""
         strength = self.parameter(signal)
-        fields = {strength.name: self.name} | {item.name: place for place, item in self.shapes.items()}
+        shapes = {item.name: place for place, item in (*self.shapes.items(), *self.further.items()) if place}
+        fields = {strength.name: self.name} | shapes
         return Effect(
             name=f"sensor.{name}.{self.name}",
             site=f"sensor.{name}",
@@ -76,6 +80,8 @@ class ReadingFault:
             random=self.random,
             timed=self.timed,
             motionless=self.motionless,
+            further=tuple(self.further.values()),
+            laws=self.laws,
         )
 
 

@@ -1,6 +1,7 @@
 """The reading of a value: `saturated(gain·delayed(passed(lagged(value)))) + bias + drift·t + noise`, rounded.
 
-Lag and high-pass are of first order, `τ·ẏ + y = x` and `τ·ẏ + y = τ·ẋ`; `saturated(x) = x/(1 + |x/L|ⁿ)^(1/n)`, with
+The lag is `τ·ẏ + y = x`, or `(τ/2ζ)²·ÿ + τ·ẏ + y = x` with a damping ratio ζ, and the high-pass is
+`τ·ẏ + y = τ·ẋ`; `saturated(x) = x/(1 + |x/L|ⁿ)^(1/n)`, with
 the level L. Values are linear between ticks, for both and for a delay by any part of an interval, and zero before the
 first tick. Without effects a reading equals exactly value plus noise.
 """
@@ -17,33 +18,34 @@ from models.compiled import jit
 from models.registry import Array
 from models.saturation import saturated
 from models.system import SensorEffects
-from models.transfer_systems import first_order
+from models.transfer_systems import second_order
 
-PRESENT, GAIN, BIAS, DRIFT, QUANTUM, FADE, EARLY, LATE, DELAY, LEVEL, SHARPNESS, FORGETS, PASSES = range(13)
+PRESENT, GAIN, BIAS, DRIFT, QUANTUM, DELAY, LEVEL, SHARPNESS, FORGETS, PASSES = range(10)
+LAG = 10  # first column of the lag's propagation, as in `models.transfer_systems.second_order`
 # from KEPT on a ring of the values kept for a delay; NEWEST is its newest place
-LAGGED, PREVIOUS, PASSED, NEWEST, KEPT = range(5)
+LAGGED, LAGGED_RATE, PREVIOUS, PASSED, NEWEST, KEPT = range(6)
 
 
 class Readings(NamedTuple):
     """One laboratory's sensors with their memory, which `step` updates."""
 
-    params: Array  # (signals, 13)
-    state: Array  # (signals, 4 and as many as the longest delay needs)
+    params: Array  # (signals, 18)
+    state: Array  # (signals, 5 and as many as the longest delay needs)
 
 
 def build(interval: float, names: Sequence[str], sensors: Mapping[str, SensorEffects]) -> Readings:
     """Sensors at rest, one row per name."""
-    params = np.zeros((len(names), 13))
+    params = np.zeros((len(names), LAG + second_order.COLUMNS))
     for place, name in enumerate(names):
         more = sensors.get(name, SensorEffects())
         if more == SensorEffects():
             continue
-        row = first_order.propagators(1.0, more.lag, np.array([interval]))[0]
         steady = (more.gain, more.bias, more.drift, more.quantization)
         level = more.saturation if math.isfinite(more.saturation) else 0.0
         passing = high_pass(interval, more.high_pass)
         bent = (level, more.saturation_sharpness)
-        params[place] = (1.0, *steady, *row, more.delay / interval, *bent, *passing)
+        lagging = second_order.propagators(1.0, more.lag, more.lag_damping, np.array([interval]))[0]
+        params[place] = (1.0, *steady, more.delay / interval, *bent, *passing, *lagging)
     longest = float(np.max(params[:, DELAY], initial=0.0))
     return Readings(params, np.zeros((len(names), KEPT + (int(longest) + 2 if longest > 0.0 else 0))))
 
@@ -87,11 +89,10 @@ def step(sensors: Readings, place: int, value: float, noise: float, t: float) ->
     params, state = sensors.params, sensors.state
     if params[place, PRESENT] == 0.0:
         return value + noise
-    lagged = (
-        params[place, FADE] * state[place, LAGGED]
-        + params[place, EARLY] * state[place, PREVIOUS]
-        + params[place, LATE] * value
-    )
+    lagging, before, rate = params[place, LAG:], state[place, PREVIOUS], state[place, LAGGED_RATE]
+    lagged = second_order.step(lagging, second_order.OUTPUT, state[place, LAGGED], rate, before, value)
+    rate = second_order.step(lagging, second_order.RATE, state[place, LAGGED], rate, before, value)
+    state[place, LAGGED_RATE] = rate
     passed = lagged
     if params[place, FORGETS] > 0.0:
         change = params[place, PASSES] * (lagged - state[place, LAGGED])

@@ -7,32 +7,35 @@ import math
 import numpy as np
 
 from common.recording.imported import later
+from laboratories.table import motor
 from models.registry import Array
 from models.system import System
 
 
 def motor_bend(system: System, command: Array, place: float | None = None) -> Array:
-    """Means of the motor's force around each tick, less those of straight lines between ticks, (ticks,) N.
+    """Means of the motor's force around each tick, less those of a smooth curve through the ticks, (ticks,) N.
 
-    With a `place` from 0 at a tick to 1 at the next one it is what the force itself has there, less such lines.
+    With a `place` from 0 at a tick to 1 at the next one it is what the force itself has there, less such a curve.
 
-    `command` (ticks,) N is held until the next tick. After its step the force u(t) = F + (u₀ − F)·e^(−t/T) changes
-    fast and then slowly; over an interval Δ its mean lies 1/(1 − e^(−a)) − 1/a − 1/2 of its change above that of a
-    straight line, with a = Δ/T, and at the place p it has made (1 − e^(−a·p))/(1 − e^(−a)) of its change. The limit of
-    the force is taken to be sharp.
+    `command` (ticks,) N is held until the next tick. After its step the force of a motor of first order changes fast
+    and then slowly. What it has beyond a straight line is the mean of that in the two intervals beside a tick; a smooth
+    curve lies below the line by second differences. The limit of the force is taken to be sharp.
     """
-    from scipy import signal
-
     effects, lag = system.effects.damper, system.plan.damper.motor_time_constant
     wanted = np.clip(effects.gain * command, -effects.force_limit, effects.force_limit)
-    steps = system.plan.test.interval / lag if lag > 0.0 else math.inf
-    share = -math.expm1(-steps)
-    force = signal.lfilter([0.0, share], [1.0, share - 1.0], wanted)
+    interval, damping = system.plan.test.interval, effects.motor_damping
+    states = motor.states(wanted, interval, lag, damping)
+    at = 0.5 if place is None else place
+    along = (1.0 - at) * states[motor.FORCE, :-1] + at * states[motor.FORCE, 1:]
+    inside = wanted[:-1] if at > 0.0 else states[motor.FORCE, :-1]  # of a motor that follows at once
+    if lag > 0.0 and place is None:
+        inside = motor.within(interval, lag, damping)[motor.INTEGRAL, :-1] / interval @ states[:, :-1]
+    elif lag > 0.0:
+        inside = motor.within(at * interval, lag, damping)[motor.FORCE, :-1] @ states[:, :-1]
+    beyond = inside - along
+    smooth = 1.0 / 12.0 if place is None else 0.5 * place * (1.0 - place)
     result = np.zeros(command.size)
-    above = 1.0 / share - 1.0 / steps - 0.5
-    if place is not None:
-        above = -math.expm1(-place * steps) / share - place if place > 0.0 else 0.0
-    result[1:-1] = above * 0.5 * (force[2:] - force[:-2])
+    result[1:-1] = 0.5 * (beyond[:-1] + beyond[1:]) + smooth * np.diff(states[motor.FORCE], 2)
     return result
 
 

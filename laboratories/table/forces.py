@@ -159,7 +159,7 @@ def resist(columns: Array, lab: TableLab, length: float) -> None:
         state[rail] -= state[size + INPUTS + HELD]
     if lab.learned.size > 0:
         state[rail] += preisach.step(lab.learned, lab.learned_memory, middle, state[STROKE_RATE])
-    base = BASE_RATE if size > BASE else TABLE_RATE
+    base = BASE_RATE if size > BASE_RATE else TABLE_RATE
     if limits[FASTEST] < math.inf:
         state[drag] += throttled(limits, state, size, base, length)
     if lab.braked.size > 0:

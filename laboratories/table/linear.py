@@ -20,10 +20,15 @@ BEHIND_LOOP = 1.0  # the law of `table.backlash` with the play between loop and 
 INPUTS = 5  # columns behind the states: command before and after, motor command, g, table friction
 
 
-def propagation(length: float, table: ShakingTable, damper: Damper, effects: TableEffects) -> Array:
-    """Propagation over one segment; shape (n, n + 5)."""
+def propagation(
+    length: float, table: ShakingTable, damper: Damper, effects: TableEffects, motor_damping: float = math.inf
+) -> Array:
+    """Propagation over one segment; shape (n, n + 5).
+
+    `motor_damping` is the damping ratio of a motor of second order, infinite for one of first order.
+    """
     if not math.isinf(table.frequency):
-        return lagging_matrix(length, table, damper, effects)
+        return lagging_matrix(length, table, damper, effects, motor_damping)
     nulls = {
         "backlash_law": 0.0,
         "compliance": 0.0,
@@ -39,10 +44,10 @@ def propagation(length: float, table: ShakingTable, damper: Damper, effects: Tab
             raise InputError(
                 f"An ideal table (frequency inf) cannot have the effect '{name}': leave it out, or give a frequency."
             )
-    return ideal_matrix(length, damper)
+    return ideal_matrix(length, damper, motor_damping)
 
 
-def damper_rows(a: Array, b: Array, damper: Damper) -> None:
+def damper_rows(a: Array, b: Array, damper: Damper, motor_damping: float) -> None:
     """Fill the damper's and the motor's rows of the rate matrices, the table's acceleration left out."""
     a[STROKE, STROKE_RATE] = 1.0
     a[STROKE_RATE, STROKE] = -damper.stiffness / damper.mass
@@ -50,17 +55,24 @@ def damper_rows(a: Array, b: Array, damper: Damper) -> None:
     b[STROKE_RATE, RAIL] = -1.0 / damper.mass
     if damper.motor_time_constant == 0.0:
         b[STROKE_RATE, PUSH] = 1.0 / damper.mass
-    else:
-        a[STROKE_RATE, MOTOR] = 1.0 / damper.mass
+        return
+    a[STROKE_RATE, MOTOR] = 1.0 / damper.mass
+    if math.isinf(motor_damping):
         a[MOTOR, MOTOR] = -1.0 / damper.motor_time_constant
         b[MOTOR, PUSH] = 1.0 / damper.motor_time_constant
+        return
+    omega, motor_rate = 2.0 * motor_damping / damper.motor_time_constant, a.shape[0] - 1
+    a[MOTOR, motor_rate] = 1.0
+    a[motor_rate, MOTOR], a[motor_rate, motor_rate] = -(omega**2), -2.0 * motor_damping * omega
+    b[motor_rate, PUSH] = omega**2
 
 
-def states(effects: TableEffects) -> int:
-    """How many states a table has with its effects."""
+def states(damper: Damper, effects: TableEffects, motor_damping: float) -> int:
+    """How many states table, damper and motor have; the rate of the force of a motor of second order is the last."""
+    beyond = int(math.isfinite(motor_damping) and damper.motor_time_constant > 0.0)
     if not math.isinf(effects.second_frequency):
-        return 10
-    return 6 if math.isinf(effects.oil_frequency) else 8
+        return SWING_RATE + 1 + beyond
+    return beyond + (ACCELERATION if math.isinf(effects.oil_frequency) else BASE_RATE) + 1
 
 
 def swinging(a: Array, b: Array, rate: int, omega: float, effects: TableEffects) -> None:
@@ -79,7 +91,9 @@ def swinging(a: Array, b: Array, rate: int, omega: float, effects: TableEffects)
     b[rate] /= 1.0 - share
 
 
-def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: TableEffects) -> Array:
+def lagging_matrix(
+    length: float, table: ShakingTable, damper: Damper, effects: TableEffects, motor_damping: float
+) -> Array:
     """Propagation over one segment of `length` s for a table of second order; shape (n, n + 5).
 
     Under the damper's force F the table gives way as if its command were changed by compliance·F.
@@ -87,8 +101,8 @@ def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: 
     ÿ = (1 − σ)·ẍ + ω_o²·(x − y) + 2ζ_o·ω_o·((1 − σ)·ẋ − ẏ), with x the motion of the table below it.
     A mass that swings on the platform pulls at the loop, as the damper does.
     """
-    size = states(effects)
-    place, rate = (TABLE, TABLE_RATE) if size == 6 else (BASE, BASE_RATE)
+    size = states(damper, effects, motor_damping)
+    place, rate = (BASE, BASE_RATE) if size > BASE_RATE else (TABLE, TABLE_RATE)
     omega = 2.0 * math.pi * table.frequency
     a, b = np.zeros((size, size)), np.zeros((size, 4))
     a[place, rate] = 1.0
@@ -102,9 +116,9 @@ def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: 
         b[rate, PUSH] -= yielding
     else:
         a[rate, MOTOR] -= yielding
-    if size > SWING:
+    if size > SWING_RATE:
         swinging(a, b, rate, omega, effects)
-    if size > BASE:
+    if size > BASE_RATE:
         rigid = math.isinf(effects.oil_frequency)  # no oil column: the platform is where the loop is
         oil = omega if rigid else 2.0 * math.pi * effects.oil_frequency
         a[TABLE, TABLE_RATE] = 1.0
@@ -117,10 +131,10 @@ def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: 
             b[TABLE_RATE] += straight * b[rate]
         if effects.backlash_law == BEHIND_LOOP:  # dashpots of flanks are between the two
             a[TABLE_RATE, BASE_RATE] = 2.0 * effects.oil_damping * oil
-    if size > SWING:
+    if size > SWING_RATE:
         a[SWING_RATE] -= a[TABLE_RATE]
         b[SWING_RATE] -= b[TABLE_RATE]
-    damper_rows(a, b, damper)
+    damper_rows(a, b, damper, motor_damping)
     a[STROKE_RATE] -= a[TABLE_RATE]
     b[STROKE_RATE] -= b[TABLE_RATE]
     result = propagate_ramp(a, b, length, damper)
@@ -133,15 +147,15 @@ def lagging_matrix(length: float, table: ShakingTable, damper: Damper, effects: 
     return result
 
 
-def ideal_matrix(length: float, damper: Damper) -> Array:
-    """Propagation over one segment of `length` s for a table that follows its ramped command at once; shape (6, 11).
+def ideal_matrix(length: float, damper: Damper, motor_damping: float) -> Array:
+    """Propagation over one segment of `length` s for a table that follows its ramped command at once; shape (n, n + 5).
 
     The table's velocity is constant over a segment and steps at its beginning, which steps the stroke's
     velocity the other way; the acceleration is that step over the segment's length.
     """
-    size = 6
+    size = states(damper, TableEffects(), motor_damping)
     a, b = np.zeros((size, size)), np.zeros((size, 4))
-    damper_rows(a, b, damper)
+    damper_rows(a, b, damper, motor_damping)
     width = size + INPUTS
     slope = np.zeros(width)
     slope[size], slope[size + 1] = -1.0 / length, 1.0 / length

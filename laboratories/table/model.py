@@ -86,7 +86,8 @@ def build(
     damper = replace(damper, mass=damper.mass - behind_coupling[0])
     numbers = segments.levels(interval, on_table, on_damper)
     taps, memory, lengths, walk = segments.divided(interval, table.delay, numbers)
-    rows = np.stack([propagation(float(length), table, damper, on_table) for length in lengths])
+    damping = on_damper.motor_damping
+    rows = np.stack([propagation(float(length), table, damper, on_table, damping) for length in lengths])
     size = rows.shape[1]
     columns = np.zeros((len(rows), size + INPUTS, max(size, ROWS)))
     columns[:, :, :size] = rows.transpose(0, 2, 1)

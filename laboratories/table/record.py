@@ -52,11 +52,11 @@ class TableLab(NamedTuple):
     spring: Array  # (stiffness N/m, dashpot N·s/m) of the damper
     limits: Array  # effects that are not in the matrices
     history: Array  # table commands written, newest first
-    # (n + 14,), n = 6, 8 with an oil column, or 10 with a mass that swings on the platform: behind the states the
-    # inputs, the command after the play, an ideal table's last velocity, the force of the rail's bristles, of a mass
-    # behind a coupling how far it is ahead of the first one, the rate of that, and the coupling's force on the first
-    # one, what the bearings' bristles brake by, and of what is fed forward the last command and its rate behind the
-    # filter
+    # (n + 14,), n = 6, 8 with an oil column, or 10 with a mass that swings on the platform, and one more with a motor
+    # of second order: behind the states the inputs, the command after the play, an ideal table's last velocity, the
+    # force of the rail's bristles, of a mass behind a coupling how far it is ahead of the first one, the rate of that,
+    # and the coupling's force on the first one, what the bearings' bristles brake by, and of what is fed forward the
+    # last command and its rate behind the filter
     state: Array
     free: Array  # (rows,): the states at a segment's end without g and the table's friction
     learned: Array  # a law of `models.preisach` of the stroke, empty for none

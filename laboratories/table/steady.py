@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from laboratories.column.model import SUBSTEP
 from laboratories.table.forces import rubbing, with_forces
-from laboratories.table.linear import BASE, BASE_RATE, INPUTS, STROKE, STROKE_RATE, TABLE_RATE
+from laboratories.table.linear import BASE_RATE, INPUTS, STROKE, STROKE_RATE, TABLE_RATE
 from laboratories.table.record import (
     BRISTLES,
     FRICTION,
@@ -55,7 +55,7 @@ def steady(
     if limits[STOP_STIFFNESS] > 0.0 and not usual and touches(columns, lab):
         return False
     if limits[TABLE_FRICTION] > 0.0:
-        base = BASE_RATE if size > BASE else TABLE_RATE
+        base = BASE_RATE if size > BASE_RATE else TABLE_RATE
         bent = state[size + INPUTS + TABLE_BRISTLES] - bristles[1] if limits[TABLE_PRESLIDING] > 0.0 else 0.0
         if abs(bent) > EVEN * limits[TABLE_FRICTION] or not slides(
             columns, lab, base, TABLE_SHAPE, limits[TABLE_VELOCITY], usual

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy import signal
 from scipy.integrate import solve_ivp
 
 from common.plan.plan import Plan
@@ -63,12 +64,12 @@ def test_gain_bias_and_drift_give_a_straight_line(
     assert np.allclose(got, gain * given_ + bias + drift * t + noises, rtol=1e-12, atol=1e-6)
 
 
-@given(tau=st.floats(1e-4, 0.5))
+@given(tau=st.floats(1e-4, 0.5), damping=st.sampled_from([math.inf, 0.75, 1.0, 1.9]))
 @settings(max_examples=30)
-def test_the_steady_lag_behind_a_ramp_is_the_time_constant(tau: float) -> None:
+def test_the_steady_lag_behind_a_ramp_is_the_time_constant(tau: float, damping: float) -> None:
     ticks = math.ceil(25.0 * tau / DT) + 5
     ramp = 3.0 * DT * np.arange(ticks)
-    got = read(ramp, SensorEffects(lag=tau))
+    got = read(ramp, SensorEffects(lag=tau, lag_damping=damping))
     assert ramp[-1] - got[-1] == pytest.approx(3.0 * tau, rel=1e-6)
 
 
@@ -81,6 +82,16 @@ def test_the_response_to_a_ramped_step_agrees_with_the_closed_form(tau: float) -
     early, late = (x - tau * (-np.expm1(-x / tau)) for x in (t, t - DT))
     assert got[0] == 0.0
     assert np.allclose(got[1:], (early - late) / DT, atol=1e-10)
+
+
+def test_a_sensors_lag_of_second_order_solves_its_equation() -> None:
+    t = DT * np.arange(300)
+    values = np.sin(17.0 * t) + 0.2 * np.sin(90.0 * t)
+    effect = (f"sensor.{NAME}.lag", {"time_constant": 0.012, "law": 1.0, "damping": 0.6})
+    late = lay(System(Plan()), [effect]).effects.sensors[NAME]
+    omega = 2.0 * 0.6 / 0.012
+    exact = signal.lsim(([omega**2], [1.0, 1.2 * omega, omega**2]), values, t)[1]
+    assert np.allclose(read(values, late), exact, atol=1e-9)
 
 
 def test_a_sensors_lag_solves_its_equation_before_gain_and_bias_apply() -> None:

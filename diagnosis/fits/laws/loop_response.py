@@ -69,7 +69,8 @@ class LoopResponse(Measured):
         if effects is None:
             return 1.0
         late = effects.delay + effects.logger_delay
-        return np.asarray(effects.gain * np.exp(-late * self._s) / (1.0 + effects.lag * self._s))
+        lag = 1.0 + effects.lag * self._s + (effects.lag * self._s / (2.0 * effects.lag_damping)) ** 2
+        return np.asarray(effects.gain * np.exp(-late * self._s) / lag)
 
     def first(self, ticks: int) -> LoopResponse:
         """The whole of it, because a spectrum has no beginning."""

@@ -13,10 +13,14 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from common.plan.laboratory_tables import Actuator
-from models.system import ActuatorEffects, ColumnEffects
+from common.plan.plan import Plan
+from laboratories.effects import lay
+from models.system import ActuatorEffects, ColumnEffects, System
 from tests.laboratories.effects.histories import DT, SHORT, Array, K, ramped, run_a, there_and_back, tones
 
 DIRECT = Actuator(gain=1.0, delay=0.0, time_constant=0.0)
+DIRECT_LAG = Actuator(gain=1.0, delay=0.0, time_constant=0.03)
+LAG = "actuator.time_constant"
 
 
 @pytest.mark.parametrize(("gain", "load"), [(1.0, 0.0), (0.9, 2e-8)])
@@ -45,6 +49,33 @@ def test_the_servo_loop_solves_its_equation_with_limit_dead_band_and_load(
     linear = run_a(command, actuator)[:, 0]
     assert np.max(np.abs(linear - exact)) > 1e-4  # there is something to be seen
     assert np.max(np.abs(got - exact)) < 2e-3 * np.max(np.abs(exact))
+
+
+@pytest.mark.parametrize(("zeta", "compliance"), [(0.4, 0.0), (1.6, 0.0), (0.7, 2e-8)])
+def test_a_servo_loop_of_second_order_solves_its_equation(zeta: float, compliance: float) -> None:
+    values = {"factor": 1.2, "law": 1.0, "damping": zeta}
+    system = lay(System(Plan(actuator=Actuator(delay=0.0133, time_constant=0.025))), [(LAG, values)])
+    command, omega = tones(400, size=1.5e-3), 2.0 * zeta / 0.030
+    more = replace(system.effects.actuator, compliance=compliance)
+    got = run_a(command, system.plan.actuator, actuator_effects=more)
+    reached = ramped(command, 0.0133)
+
+    def slope(t: float, y: Array) -> Any:
+        return [y[1], omega**2 * (reached(t) - y[0]) - 2.0 * zeta * omega * y[1]]
+
+    times = DT * np.arange(1, command.size + 1)
+    exact = solve_ivp(
+        slope, (0, times[-1]), [0.0, 0.0], t_eval=times, max_step=DT / 8, rtol=1e-8, atol=1e-12
+    ).y[0]
+    assert np.max(np.abs(got[:, 0] * (1.0 + compliance * K) - exact)) < 1e-5 * np.max(np.abs(exact))
+
+
+def test_a_servo_loop_of_second_order_obeys_its_velocity_limit_and_goes_on_from_there() -> None:
+    more = ActuatorEffects(velocity_limit=0.03, lag_damping=0.5)
+    got = run_a(np.full(600, 0.01), DIRECT_LAG, actuator_effects=more)[:, 0]
+    assert np.max(np.abs(np.diff(got))) == pytest.approx(0.03 * DT, rel=1e-6)
+    assert np.max(got) < 0.0104  # it arrives slowly: without the limit it would overshoot to 0.0116
+    assert got[-1] == pytest.approx(0.01, rel=1e-6)
 
 
 @pytest.mark.parametrize(("sharpness", "stall"), [(2.0, math.inf), (math.inf, 4e4)], ids=["gradual", "load"])

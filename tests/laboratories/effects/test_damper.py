@@ -181,6 +181,24 @@ def test_the_motors_lag_is_first_order() -> None:
     assert np.allclose(got, -30.0 * (1.0 - np.exp(-t / 0.011)), atol=1e-9)
 
 
+@pytest.mark.parametrize("zeta", [0.3, 0.8])
+def test_the_motors_lag_is_second_order_under_its_second_law(zeta: float) -> None:
+    values = {"time_constant": 0.008, "law": 1.0, "damping": zeta}
+    system = lay(System(Plan()), [("damper.motor_lag", values)])
+    damper = dataclasses.replace(system.plan.damper, stiffness=0.0, damping=0.0)
+    got = run_b(np.zeros(60), np.full(60, 30.0), damper=damper, damper_effects=system.effects.damper)
+    t, omega = DT * np.arange(1, 61), 2.0 * zeta / 0.011
+    turned = omega * math.sqrt(1.0 - zeta**2)
+    step = 1.0 - np.exp(-zeta * omega * t) * (np.cos(turned * t) + zeta * omega / turned * np.sin(turned * t))
+    assert np.allclose(got[:, FORCE], -30.0 * step, atol=1e-9)
+    # on an ideal table too, and not where nothing is added to the plan's motor
+    ideal = run_b(
+        np.zeros(60), np.full(60, 30.0), ShakingTable(frequency=math.inf), damper, None, system.effects.damper
+    )
+    assert np.allclose(ideal[:, FORCE], got[:, FORCE], atol=1e-9)
+    assert lay(System(Plan()), [("damper.motor_lag", values | {"time_constant": 0.0})]) == System(Plan())
+
+
 @given(force=st.floats(-50.0, 50.0))
 @settings(max_examples=10)
 def test_a_constant_force_deflects_the_damper_as_in_statics(force: float) -> None:

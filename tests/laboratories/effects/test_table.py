@@ -14,7 +14,7 @@ from common.plan.laboratory_tables import Damper, ShakingTable
 from laboratories.table import linear
 from laboratories.table import model as table_lab
 from models import preisach
-from models.system import TableEffects
+from models.system import DamperEffects, TableEffects
 from tests.laboratories.effects.histories import (
     ACCELERATION,
     DT,
@@ -210,14 +210,14 @@ def test_the_damper_moves_the_compliant_table_by_its_force_and_not_in_statics(co
     assert abs(pushing[-1, Y]) < 0.01 * compliance * 30.0
 
 
-@pytest.mark.parametrize("motor_lag", [0.003, 0.0])
+@pytest.mark.parametrize(("motor_lag", "damping"), [(0.003, math.inf), (0.0, math.inf), (0.02, 0.5)])
 @pytest.mark.parametrize("oil", [math.inf, 16.0])
-def test_the_payload_solves_the_coupled_equations(motor_lag: float, oil: float) -> None:
+def test_the_payload_solves_the_coupled_equations(motor_lag: float, damping: float, oil: float) -> None:
     ticks, compliance = 300, 2.5e-5
     table, damper = ShakingTable(), Damper(motor_time_constant=motor_lag)
     command, motor = tones(ticks, size=5e-3), tones(ticks, seed=2, size=30.0)
     more = TableEffects(compliance=compliance, oil_frequency=oil, oil_damping=0.1)
-    got = run_b(command, motor, table, damper, more)
+    got = run_b(command, motor, table, damper, more, DamperEffects(motor_damping=damping))
     omega, swing = 2.0 * math.pi * 15.0, 2.0 * math.pi * oil
     reached = ramped(command, table.delay)
 
@@ -225,16 +225,22 @@ def test_the_payload_solves_the_coupled_equations(motor_lag: float, oil: float) 
         return float(56.8 * z[2] + 6.0 * z[3] - (z[4] if motor_lag else push))
 
     def slope(t: float, z: Array, push: float) -> list[float]:
-        y, rate, _, stroke_rate, lagged, platform, platform_rate = z
+        y, rate, _, stroke_rate, lagged, platform, platform_rate, lagged_rate = z
         load = force(z, push)
         a = omega**2 * (reached(t) + compliance * load - y) - 1.4 * omega * rate
         felt = a
         if not math.isinf(oil):
             felt = swing**2 * (y - platform) - 0.2 * swing * platform_rate
         turning = (push - lagged) / motor_lag if motor_lag else 0.0
-        return [rate, a, stroke_rate, -load / 16.0 - felt, turning, platform_rate, felt]
+        bent = 0.0
+        if math.isfinite(damping):
+            turning, bent = (
+                lagged_rate,
+                (push - lagged - motor_lag * lagged_rate) * (2.0 * damping / motor_lag) ** 2,
+            )
+        return [rate, a, stroke_rate, -load / 16.0 - felt, turning, platform_rate, felt, bent]
 
-    z, exact = np.zeros(7), []
+    z, exact = np.zeros(8), []
     for tick, push in enumerate(motor):
         span = (tick * DT, (tick + 1) * DT)
         z = solve_ivp(slope, span, z, args=(push,), max_step=DT / 2, rtol=1e-9, atol=1e-13).y[:, -1]

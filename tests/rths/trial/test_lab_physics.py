@@ -123,6 +123,35 @@ def test_a_motor_without_lag_follows_at_once() -> None:
     assert found["damper_force"][1] == pytest.approx(-10.0, abs=0.02)
 
 
+def test_a_slow_valve_makes_the_servo_loop_as_late_as_a_slow_loop() -> None:
+    ramp = np.linspace(0.0, 3e-3, 400)
+    late = {
+        formula: play_a(effect("actuator.time_constant", formula, factor=1.5), command=ramp)[
+            "column_displacement"
+        ]
+        for formula in ("valve", "plain")
+    }
+    assert np.ptp([values[-1] for values in late.values()]) < 2e-6
+    assert np.max(np.abs(late["valve"] - late["plain"])) > 5e-6
+
+
+def test_a_motor_of_second_order_overshoots_and_is_as_late() -> None:
+    ramp = np.linspace(0.0, 60.0, 300)
+    late = {
+        formula: play_b(
+            effect("damper.motor_lag", formula, time_constant=0.02), command=np.zeros(300), motor=ramp
+        )["damper_force"]
+        for formula in ("second_order", "first_order")
+    }
+    assert late["second_order"][-1] == pytest.approx(late["first_order"][-1], abs=0.3)
+    step = play_b(
+        effect("damper.motor_lag", "second_order", time_constant=0.02),
+        command=np.zeros(100),
+        motor=np.full(100, 10.0),
+    )["damper_force"]
+    assert 1.01 < np.max(np.abs(step)) / 10.0 < 1.1  # 4.6 % for a ratio of 0.7
+
+
 @pytest.mark.parametrize("name", ["actuator.delay", "table.delay"])
 def test_pades_approximation_delays_as_asked_for(name: str) -> None:
     """Padé's approximation of 8 ms more delays as the ring does; of 2 ms less, too."""

@@ -17,6 +17,7 @@ SIGNALS = (
 
 FORMULAS: dict[str, tuple[str, ...]] = {
     "actuator.delay": ("pade",),
+    "actuator.time_constant": ("valve",),
     "actuator.velocity_limit": ("smooth", "orifice"),
     "actuator.backlash": ("spring",),
     "actuator.compliance": ("oil_column",),
@@ -34,6 +35,7 @@ FORMULAS: dict[str, tuple[str, ...]] = {
     "table.friction": ("tanh",),
     "damper.friction": ("tanh", "dahl", "lugre"),
     "damper.force_limit": ("smooth",),
+    "damper.motor_lag": ("second_order",),
     "damper.stroke_stop": ("hertz", "linear"),
     **{f"sensor.{signal}.lag": ("butterworth",) for signal in SIGNALS},
     **{f"sensor.{signal}.saturation": ("tanh",) for signal in SIGNALS},
@@ -41,7 +43,6 @@ FORMULAS: dict[str, tuple[str, ...]] = {
 """Formulas by effect of the catalogue, where they differ from the catalogue's."""
 
 PLAIN: tuple[str, ...] = (
-    "actuator.time_constant",
     "actuator.gain",
     "column.stiffness",
     "column.inertia",
@@ -54,7 +55,6 @@ PLAIN: tuple[str, ...] = (
     "damper.mass",
     "damper.second_mass",
     "damper.gain",
-    "damper.motor_lag",
     *(
         f"sensor.{signal}.{kind}"
         for signal in SIGNALS

@@ -23,8 +23,8 @@ def lengthen(values: Values, more: float) -> None:
 
 
 def time_constant(values: Values, *, factor: float) -> None:
-    """Slower or faster servo loop: `factor·T`."""
-    values["time_constant"] *= factor
+    """Slower or faster servo loop, `factor·T`, or a slow valve before it, which makes it as late."""
+    values["slower"] = factor
 
 
 def servo_gain(values: Values, *, factor: float) -> None:
@@ -121,7 +121,7 @@ def asymmetry(values: Values, *, share: float) -> None:
 
 KNOWN = {
     "actuator.delay": KnownEffect(servo_delay, {"pade": 0}),
-    "actuator.time_constant": KnownEffect(time_constant, PLAIN),
+    "actuator.time_constant": KnownEffect(time_constant, {"valve": 1, "plain": 0}, "slow_valve"),
     "actuator.gain": KnownEffect(servo_gain, PLAIN),
     "actuator.velocity_limit": KnownEffect(
         velocity_limit, {"smooth": valve.SMOOTH, "orifice": valve.ORIFICE}, "limiting"

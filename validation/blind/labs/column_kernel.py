@@ -19,8 +19,8 @@ CONTACT = 1e4  # stiffness of the clevis over the specimen's: it takes 0.01 % of
 GREASE = 5e-3  # s, dashpot of the clevis over the specimen's stiffness: the specimen returns through the gap in 5 ms
 
 # places in `state`
-COMMAND, PISTON, SPOOL, USED, TIME, DEFORMATION, FORCE, READING = range(8)
-STATE = 8
+COMMAND, PISTON, SPOOL, USED, TIME, DEFORMATION, FORCE, READING, VALVE, ASKED = range(10)
+STATE = 10
 
 
 class Servo(NamedTuple):
@@ -31,6 +31,8 @@ class Servo(NamedTuple):
     gain: float
     delay: float  # s
     time_constant: float  # s
+    slower: float = 1.0  # times the time constant: how late the loop is
+    slow_valve: float = 0.0  # 1 where what it is later than planned is a lag of the valve before it
     pade: float = 0.0  # s, dead time that is approximated
     limiting: float = 0.0  # formula
     velocity_limit: float = 1.0  # m/s
@@ -56,6 +58,29 @@ class ColumnMemory(NamedTuple):
 
 
 @jit
+def loop_lag(p: Servo) -> float:
+    """Time constant (s) of the servo loop."""
+    return p.time_constant if valve_lag(p) > 0.0 else p.slower * p.time_constant
+
+
+@jit
+def valve_lag(p: Servo) -> float:
+    """Time constant (s) of a valve before the loop, 0 for one that follows at once."""
+    return (p.slower - 1.0) * p.time_constant if p.slow_valve > 0.0 and p.slower > 1.0 else 0.0
+
+
+@jit
+def opened(p: Servo, state: Array, wanted: float) -> float:
+    """The command (m) behind the valve a step later, for one that goes straight to `wanted` m; updates its state."""
+    slow = p.step / valve_lag(p)
+    kept = math.exp(-slow)
+    now = 1.0 + math.expm1(-slow) / slow
+    state[VALVE] = kept * state[VALVE] + (1.0 - kept - now) * state[ASKED] + now * wanted
+    state[ASKED] = wanted
+    return float(state[VALVE])
+
+
+@jit
 def velocity(
     p: Servo, stiffness: float, state: Array, added: Array, wanted: float, piston: float, time: float
 ) -> float:
@@ -67,7 +92,7 @@ def velocity(
     load = state[FORCE] + stiffness * (piston - state[PISTON])
     error = p.gain * wanted + added[unlisted_actuator.DEMAND] - piston - p.compliance * load
     error = valve.spool(state[SPOOL], error, p.hysteresis)
-    free = valve.overlap(error, p.deadband) / p.time_constant
+    free = valve.overlap(error, p.deadband) / loop_lag(p)
     free *= valve.supplied(p.droop, state[USED])
     if p.ripple != 0.0:
         omega = 2.0 * math.pi * p.ripple_frequency
@@ -166,6 +191,9 @@ def advance(
         middle = delay.before(past, back + 0.5)
         if p.pade > 0.0:
             late = delay.pade(approximation, p.pade, late, p.step)
+            middle = 0.5 * (early + late)
+        if valve_lag(p) > 0.0:
+            early, late = state[VALVE], opened(p, state, late)
             middle = 0.5 * (early + late)
         piston = drive(p, column.stiffness, state, added, early, middle, late)
         deformation = clevis(p, column.stiffness, state, piston) if p.backlash > 0.0 else piston

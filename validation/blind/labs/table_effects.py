@@ -76,8 +76,8 @@ def motor_gain(values: Values, *, factor: float) -> None:
 
 
 def motor_lag(values: Values, *, time_constant: float) -> None:
-    """Lag of the motor's force in addition to the plan's."""
-    values["motor_lag"] = max(values["motor_lag"] + time_constant, 0.0)
+    """Lag of the motor's force in addition to the plan's, or a loop of second order behind it that is as late."""
+    values["motor_more"] = time_constant
 
 
 def force_limit(values: Values, *, force: float) -> None:
@@ -142,7 +142,7 @@ KNOWN = {
     "damper.mass": KnownEffect(mass, PLAIN),
     "damper.second_mass": KnownEffect(second_mass, PLAIN),
     "damper.gain": KnownEffect(motor_gain, PLAIN),
-    "damper.motor_lag": KnownEffect(motor_lag, PLAIN),
+    "damper.motor_lag": KnownEffect(motor_lag, {"second_order": 2, "first_order": 1}, "motor_order"),
     "damper.force_limit": KnownEffect(force_limit, {"smooth": 0}),
     "damper.stroke_stop": KnownEffect(
         stroke_stop, {"hertz": mechanics.HERTZ, "linear": mechanics.LINEAR}, "stopping"

@@ -22,13 +22,17 @@ PRESLIDING = 20e-6
 # S, damping of the bristles over Coulomb friction, times their presliding: damped within a fraction of an interval.
 MICRO = 0.5e-3
 PITCH_DAMPING = 0.05  # ratio of bolted steel parts
+QUICKEST = (
+    3e-4  # s, lag below which a loop of second order is taken as one of first order: steps must follow it
+)
+CURRENT_DAMPING = 0.7  # ratio of a current loop of second order: usual tuning
 
 # places in `state`: table loop, stroke, motor, platform, pitch, appendage; each with its rate
 LOOP, LOOP_RATE, STROKE, STROKE_RATE, MOTOR, PLATE, PLATE_RATE = range(7)
-PITCH, PITCH_RATE, LOOSE, LOOSE_RATE = range(7, 11)
-MOVING = 11
-COMMAND, BRISTLE = 11, 12  # no states of the equations of motion
-STATE = 13
+PITCH, PITCH_RATE, LOOSE, LOOSE_RATE, CURRENT, CURRENT_RATE = range(7, 13)
+MOVING = 13
+COMMAND, BRISTLE = 13, 14  # no states of the equations of motion
+STATE = 15
 DISPLACEMENT, ACCELERATION, STROKE_OUT, FORCE = range(4)  # places of the readings
 
 
@@ -66,6 +70,8 @@ class TrueTable(NamedTuple):
     cam_period: float = 0.02  # m
     pitch: float = 0.0  # coupling
     pitch_omega: float = 100.0  # rad/s
+    motor_more: float = 0.0  # s, in addition to that lag
+    motor_order: float = 1.0  # 2 for a loop of second order behind that lag
     motor_gain: float = 1.0
     force_limit: float = 0.0  # N
     rubbing: float = 0.0  # formula
@@ -101,9 +107,29 @@ def asked(p: TrueTable, command: float) -> float:
 
 
 @jit
+def swings(p: TrueTable) -> bool:
+    """Whether the motor has a loop of second order."""
+    return p.motor_order > 1.0 and p.motor_more > QUICKEST
+
+
+@jit
+def first_lag(p: TrueTable) -> float:
+    """Time constant (s) of the motor's lag of first order."""
+    return p.motor_lag if swings(p) else max(p.motor_lag + p.motor_more, 0.0)
+
+
+@jit
+def pushed(p: TrueTable, x: Array, push: float) -> float:
+    """Force (N) of the motor at a state; `push` is what is asked of it."""
+    if swings(p):
+        return float(x[CURRENT])
+    return float(x[MOTOR]) if first_lag(p) > 0.0 else push
+
+
+@jit
 def damper_force(p: TrueTable, x: Array, added: Array, push: float, start: float, bristle: float) -> float:
     """Force (N) on the table at a state; `start` is the stroke to which the bristles' deflection belongs."""
-    motor = x[MOTOR] if p.motor_lag > 0.0 else push
+    motor = pushed(p, x, push)
     motor *= mechanics.motor_constant(p.motor_rise, x[STROKE])
     motor += added[unlisted_table.MOTOR]
     if p.friction > 0.0:
@@ -152,7 +178,13 @@ def rates(
     dx[LOOP], dx[LOOP_RATE] = x[LOOP_RATE], loop
     dx[PLATE], dx[PLATE_RATE] = (x[PLATE_RATE], plate) if p.oil + p.play > 0.0 else (x[LOOP_RATE], loop)
     dx[STROKE], dx[STROKE_RATE] = x[STROKE_RATE], mass - plate
-    dx[MOTOR] = (push - x[MOTOR]) / p.motor_lag if p.motor_lag > 0.0 else 0.0
+    lag = first_lag(p)
+    dx[MOTOR] = (push - x[MOTOR]) / lag if lag > 0.0 else 0.0
+    if swings(p):
+        quick = (2.0 * CURRENT_DAMPING / p.motor_more) ** 2
+        before = x[MOTOR] if lag > 0.0 else push
+        dx[CURRENT] = x[CURRENT_RATE]
+        dx[CURRENT_RATE] = quick * (before - x[CURRENT] - p.motor_more * x[CURRENT_RATE])
     dx[PITCH] = x[PITCH_RATE]
     dx[PITCH_RATE] = (
         -p.pitch * plate - 2.0 * PITCH_DAMPING * p.pitch_omega * x[PITCH_RATE] - p.pitch_omega**2 * x[PITCH]
@@ -216,7 +248,7 @@ def look(p: TrueTable, state: Array, rate: Array, held: EffectMemory, wanted: fl
     seen[unlisted_table.STROKE] = state[STROKE]
     seen[unlisted_table.STROKE_RATE] = state[STROKE_RATE]
     seen[unlisted_table.STROKE_ACC] = rate[STROKE_RATE]
-    seen[unlisted_table.PUSH] = state[MOTOR] if p.motor_lag > 0.0 else push
+    seen[unlisted_table.PUSH] = pushed(p, state, push)
     unlisted_table.hold(p.unlisted, held.sizes, held.kept, seen, held.added)
     unlisted_damper.hold(p.unlisted, held.sizes, held.kept, seen, held.added)
 

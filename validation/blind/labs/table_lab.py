@@ -90,6 +90,7 @@ def true_values(table: ShakingTable, damper: Damper) -> laying.Values:
         "stiffness": damper.stiffness,
         "dashpot": damper.damping,
         "motor_lag": damper.motor_time_constant,
+        "motor_more": 0.0,
         "motor_gain": 1.0,
         "table_gain": 1.0,
         "pade": 0.0,

@@ -1,23 +1,36 @@
 """The actuator's servo loop is slower or faster than planned.
 
-    factor·T·ẏ + y = K·u(t − L)
+    T·ẏ + y = K·u(t − L),    T = factor·T_a
 
-Where the plan has no lag, the lag is `(factor − 1)·1 ms`, as if the planned one were 1 ms. Not to be confused with
-`actuator.delay`: at low frequency both are a delay; only the lag reduces the amplitude at higher frequency.
+Where the plan has no lag, the lag is `(factor − 1)·1 ms`, as if the planned one were 1 ms. Where it has one,
+the parameter `law` chooses another formula:
+
+    1   a loop of second order, as late for slow commands: (T/2ζ)²·ÿ + T·ẏ + y = K·u(t − L),    ζ = damping
+
+A valve that is slow beside the loop makes ζ larger than 1, a loop with much gain or a resonance of the oil smaller.
+Not to be confused with `actuator.delay`: at low frequency both are a delay; only the lag takes amplitude away where
+the frequency is higher.
 """
 
 from __future__ import annotations
 
+import math
+
 from common.plan.plan import Plan
-from laboratories.effects.effect import Effect, Parameter
+from laboratories.effects.effect import Effect, Law, Parameter
+from laboratories.effects.laws import of_second_order, which_law
 from models.system import System
 
 
-def apply(system: System, factor: float) -> System:
-    """Time constant multiplied by `factor`."""
+def apply(system: System, factor: float, law: float = 0.0, damping: float = math.inf) -> System:
+    """Time constant multiplied by `factor`, and the damping ratio of law 1."""
     planned = system.plan.actuator.time_constant
     lag = planned + (factor - 1.0) * (planned or LEAST_LAG)
-    return system if factor == 1.0 else system.moved("actuator", time_constant=max(lag, 0.0))
+    if factor == 1.0:
+        return system
+    system = system.moved("actuator", time_constant=max(lag, 0.0))
+    second = law != 0.0 and planned > 0.0  # one beside no lag would be as good as a delay
+    return system.laid("actuator", lag_damping=damping) if second else system
 
 
 def starts(plan: Plan) -> tuple[float, ...]:
@@ -39,5 +52,7 @@ EFFECT = Effect(
     apply=apply,
     actuators=("fopdt",),
     starts=starts,
+    further=(which_law(1.0, "0 of first order, 1 of second order"), of_second_order()),
+    laws=(Law("of first order", {}), Law("of second order", {"damping": 1.0})),
     timed=True,
 )
