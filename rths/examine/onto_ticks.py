@@ -21,8 +21,11 @@ from rths.examine.import_map import ImportMap, SignalSource, in_unit, lab_signal
 # Distance of rows over the plan's interval, and the plan's interval over it, from which on the time has another unit:
 # milliseconds for seconds make 1000, while minutes make 60 and an oscilloscope has a hundred rows in an interval.
 FAR_APART, TOO_CLOSE = 90.0, 900.0
-GAP = 5.0  # usual distances of rows from which on rows are missing between two: those of a logger's clock differ less
+GAP = 4.5  # usual distances of rows from which on rows are missing between two: more than three of them
 FOR_A_SPLINE = 4  # rows at least
+# Of a channel that holds its value from tick to tick: rows at least in an interval, share of the ticks at which it
+# changes at least, and share of its changes that may come sooner, where rows are missing.
+ROWS_HELD, CHANGING, TOO_SOON = 2, 0.5, 0.01
 EVENLY = 1.5  # usual distances of a channel's own rows, from which on one is missing
 ON_TICKS = 1e-3  # of an interval, within which a row is on its tick: times in a text file are rounded to a microsecond
 
@@ -45,7 +48,7 @@ class OnTicks:
 
 
 def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = False) -> OnTicks:
-    """The signals at the plan's interval, by a cubic spline; numbers of messages are held.
+    """The signals at the plan's interval, by a cubic spline; numbers of messages and what holds its value are held.
 
     Raises:
         InputError: a column is missing or has a hole, its unit is of another quantity, or time does not increase or,
@@ -88,7 +91,11 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
             found.units[name] = unit
         times, values = theirs[own], scale * column[own] + source.offset
         apart = between if own.all() else not stands_on(times, t, interval)
-        found.values[name] = moved(times, values, t, row) if apart else values[nearest_rows(times, t)]
+        stairs = None if mapping.static else held(times, values, t, interval)
+        if stairs is not None:
+            apart, found.values[name] = False, stairs
+        else:
+            found.values[name] = moved(times, values, t, row) if apart else values[nearest_rows(times, t)]
         own_rate = rate if own.all() else 1.0 / float(np.median(np.diff(times)))
         found.stated[name] = channel(source, row, own_rate, between=apart)
     return found
@@ -146,6 +153,26 @@ def nearest_rows(theirs: Array, t: Array) -> npt.NDArray[np.intp]:
     after = np.clip(np.searchsorted(theirs, t), min(1, theirs.size - 1), theirs.size - 1)
     before = np.maximum(after - 1, 0)
     return np.where(np.abs(theirs[after] - t) < np.abs(theirs[before] - t), after, before)
+
+
+def held(times: Array, values: Array, t: Array, interval: float) -> Array | None:
+    """What a channel holds from each tick `t` on for an interval (s); None for one that is no staircase.
+
+    What a controller computes tick by tick is one where the logger is faster. A curve through such steps would be wrong
+    between them. Where in an interval the steps come, by the clock of the logger, is told by all of them.
+    """
+    per = int(interval / float(np.median(np.diff(times))) + ON_TICKS) if times.size > 1 else 0
+    changes = np.flatnonzero(np.diff(values))
+    if per < ROWS_HELD or changes.size < CHANGING * (times[-1] - times[0]) / interval:
+        return None
+    if np.mean(np.diff(changes) < per) >= TOO_SOON:
+        return None
+    steps = 0.5 * (times[changes] + times[changes + 1]) / interval
+    about = float(np.angle(np.mean(np.exp(2j * np.pi * steps)))) / (2.0 * np.pi)
+    away = (steps - about + 0.5) % 1.0 - 0.5
+    rate, first = np.polyfit(steps, away, 1)  # its clock is fast or slow against that of the controller
+    ticks = t / interval
+    return values[nearest_rows(times, interval * (ticks + about + first + rate * ticks + 0.5))]
 
 
 def moved(theirs: Array, values: Array, t: Array, row: Signal) -> Array:

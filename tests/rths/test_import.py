@@ -92,6 +92,21 @@ def test_rows_between_the_ticks_lose_nothing_of_a_motion(bring: Any) -> None:
     assert np.max(np.abs(found - expected)[8:-8]) < 2e-6  # straight lines are off by up to 60 µm
 
 
+@pytest.mark.parametrize("begun", [0.0, 0.003, -0.003])
+def test_what_a_controller_holds_from_tick_to_tick_is_no_curve(bring: Any, begun: float) -> None:
+    rows = np.arange(850) / 205.0 + 0.1  # 2.05 rows in an interval
+    ticks = np.floor((rows + begun) / 0.01 + 1e-9)
+    steps = 5.0 * np.sin(2.0 * np.pi * 0.7 * 0.01 * ticks)
+    smooth = 5.0 * np.sin(2.0 * np.pi * 0.7 * rows)
+    code, run = bring(table("t,u,y", rows, steps, smooth), DRIVE)
+    assert code == 0
+    command = run.columns["master"]["actuator_command"]
+    expected = 5e-3 * np.sin(2.0 * np.pi * 0.7 * 0.01 * (10.0 + np.arange(command.size)))
+    assert np.max(np.abs(command - expected)[1:-1]) < 1e-9
+    assert not known(run).channel("master", "actuator_command").interpolated
+    assert known(run).channel("master", "column_displacement").interpolated
+
+
 def test_rows_between_the_ticks_are_marked(bring: Any, capsys: Any) -> None:
     code, run = bring(table("t,u,y", 1.05 * TIMES, COMMAND, LATE), DRIVE)
     assert code == 0
