@@ -69,11 +69,18 @@ def at_any_size(data: Data, scales: Scales) -> tuple[Search, Fit | None]:
     """What was found in a part, with nothing withheld where what it leaves acts for a short time only.
 
     Where no gap is larger than what two good solutions of one model may differ by, a smaller one is looked for: in the
-    fit beside it, which is None where there is a gap.
+    fit beside it, which is None where there is a gap. Behind a filter of a logger none is: what the stated filter is
+    off, or does between the ticks, is larger than a smaller gap.
     """
     bare = settling.settled(fitting.fit(data, {}))
     found = found_from(data, bare, scales)
-    if data.part.exact or leaves(found.chosen, model_error(found.chosen)) or found_enough(found, bare):
+    filtered = bool(np.isfinite(data.part.passes).any())
+    if (
+        data.part.exact
+        or filtered
+        or leaves(found.chosen, model_error(found.chosen))
+        or found_enough(found, bare)
+    ):
         return found, None
     fine = fitting.polished(settling.settled(fitting.fit(data.fine, {}, bare.z)))
     erring = model_error(fine)

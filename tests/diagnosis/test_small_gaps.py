@@ -8,12 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from common.recording.imported import ImportedChannel, LoggerFilter
 from diagnosis.findings.certainty.other_causes import EITHER, other_causes
 from diagnosis.findings.certainty.trust import trusted
 from diagnosis.findings.verdict import judge
 from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import search
+from diagnosis.fits.search import at_any_size, search
 from diagnosis.fits.unexplained import foresees, leaves, model_error
 from diagnosis.recorded.parts import FINE_ERROR, MODEL_ERROR, LaboratoryPart
 from diagnosis.recorded.record import Record
@@ -46,6 +47,20 @@ def test_a_gap_that_two_good_solutions_may_differ_by_is_seen(
     found = search(data, Scales(whole))
     assert found.data.erring == (FINE_ERROR if share else MODEL_ERROR)
     assert judge(found).outcome == outcome
+
+
+def test_so_small_a_gap_is_not_looked_for_behind_a_filter(cases: Cases) -> None:
+    whole = cases.record({}, duration=8.0)
+    part = lagging(whole, WIDTH)
+    filtered = ImportedChannel(LoggerFilter("butterworth", 4, 80.0))
+    data = replace(
+        residuals.prepare(part, whole), part=part.replaced(channels=(filtered,) * len(part.channels))
+    )
+    assert search(replace(data, part=part), Scales(whole)).data.erring == FINE_ERROR
+    assert np.isfinite(data.part.passes).all()
+    found = at_any_size(data, Scales(whole))
+    assert found[1] is None
+    assert found[0].data.erring == MODEL_ERROR
 
 
 def test_a_gap_that_the_inputs_foresee_is_seen_below_what_its_energy_tells(cases: Cases) -> None:
