@@ -10,13 +10,14 @@ import numpy as np
 
 from diagnosis.findings.certainty import trust
 from diagnosis.findings.certainty.intervals import Interval, intervals
-from diagnosis.findings.certainty.other_causes import described, other_causes, swings
+from diagnosis.findings.certainty.other_causes import EITHER, described, other_causes, swings
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import MATERIAL, gaps
 from diagnosis.fits.worth import PRIOR_GAIN
+from diagnosis.recorded.missing_rows import without_readings
 from diagnosis.report.records import Candidate
 from diagnosis.report.values import Parameters, Value
 from laboratories.effects.effect import Effect
@@ -163,7 +164,8 @@ def unit_of(effect: Effect, parameter: str) -> str:
 def nothing(found: Diagnosis) -> float:
     """Probability that there is no effect: one, down to 0.7 where a search nearly named one.
 
-    By the fourth power only what comes close to a limit of the search lowers it: half of a limit costs 2 %.
+    By the fourth power only what comes close to a limit of the search lowers it: half of a limit costs 2 %. It is half
+    as large where readings were recorded that could not be judged.
     """
     worst = 0.0
     for verdict in found.verdicts:
@@ -171,7 +173,8 @@ def nothing(found: Diagnosis) -> float:
         sizes = np.abs(fit.z) / math.sqrt(PRIOR_GAIN)
         left = [item.ratio / MATERIAL for item in gaps(fit, fit.data.group)]
         worst = max([worst, *map(float, sizes), *left, float(verdict.own is not None)])
-    return float(1.0 - 0.3 * min(worst, 1.0) ** 4)
+    unjudged = without_readings([verdict.search.data.part for verdict in found.verdicts], found.record)
+    return float(1.0 - 0.3 * min(worst, 1.0) ** 4) * (EITHER if unjudged else 1.0)
 
 
 def entry(effects: list[str], probability: float, parameters: Parameters, score: float) -> Candidate:

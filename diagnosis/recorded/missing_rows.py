@@ -13,22 +13,26 @@ from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 
+USUALLY = 0.95  # of the lines over as long a time, which miss no more than a line over a gap is taken to
+FEWEST = 20  # times a half of a gap that a command must last, for that to be known
 LEAST = 0.5  # of the ticks, at which a reading must count for its noise to be known
 
 
 def with_known_commands(part: LaboratoryPart, record: Record) -> LaboratoryPart:
     """The part with its readings missing where they depend on commands that are not known.
 
-    Straight lines stand where rows are missing. The commands are moved there by half a wave of their rms, and a reading
-    counts again once the laboratory of the plan has forgotten it, to what two good solutions of one model differ by:
-    not where a motion that it still swings with passes zero.
+    Straight lines stand where rows are missing. The commands are moved there by half a wave as high as what such lines
+    miss elsewhere, and a reading counts again once the laboratory of the plan has forgotten it, to what two good
+    solutions of one model differ by: not where a motion that it still swings with passes zero.
     """
     gaps = record.stated.gaps if record.stated else ()
     if not gaps:
         return part
     t = record.plan.test.interval * np.arange(record.ticks, dtype=np.float64)
-    wave = np.sum([half_wave(t, begin, end) for begin, end in gaps], axis=0)
-    moved = {name: values + np.std(values) * wave for name, values in part.inputs.items()}
+    moved = {
+        name: values + np.sum([missed(values, t, *gap) * half_wave(t, *gap) for gap in gaps], axis=0)
+        for name, values in part.inputs.items()
+    }
     system = record.systems[part.role]
     change = np.abs(part.replaced(inputs=moved).predict(system) - part.predict(system))
     known = [
@@ -39,15 +43,32 @@ def with_known_commands(part: LaboratoryPart, record: Record) -> LaboratoryPart:
     return part.replaced(present=present)
 
 
-def unjudged(parts: Sequence[Part], record: Record) -> list[str]:
-    """A sentence on readings that count nowhere, as their laboratory remembers a gap for too long."""
-    names = [
+def missed(values: Array, t: Array, begin: float, end: float) -> float:
+    """What a straight line over a gap from `begin` to `end` (s) may miss of a command (ticks,): at most its rms.
+
+    In the middle of as long a time elsewhere all but a twentieth of such lines miss no more.
+    """
+    half, most = math.ceil(0.5 * (end - begin) / (t[1] - t[0]) - 1e-6), float(np.std(values))
+    if values.size < FEWEST * half:
+        return most
+    middle = values[half:-half] - 0.5 * (values[: -2 * half] + values[2 * half :])
+    return min(most, float(np.quantile(np.abs(middle), USUALLY)))
+
+
+def without_readings(parts: Sequence[Part], record: Record) -> list[str]:
+    """The readings that were recorded and count nowhere, as their laboratory remembers a gap for too long."""
+    return [
         name
         for part in parts
         if isinstance(part, LaboratoryPart)
         for name, there in zip(part.signals, part.present.T, strict=True)
         if record.has(name) and not there.any()
     ]
+
+
+def unjudged(parts: Sequence[Part], record: Record) -> list[str]:
+    """A sentence on readings that count nowhere, as their laboratory remembers a gap for too long."""
+    names = without_readings(parts, record)
     if not names:
         return []
     return [
