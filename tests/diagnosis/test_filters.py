@@ -134,6 +134,17 @@ def weighed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("weighed")
+@pytest.mark.parametrize(("sure", "said"), [(2000.0, 1.0), (100.0, 0.85)], ids=["most", "few"])
+def test_readings_together_decide_on_one_delay(sure: float, said: float) -> None:
+    """Forces lose 3 % of what they gain by the delay of the others, which is little beside what these gain."""
+    forces, others = readings(Wanted(0.85, 600.0), Wanted(1.0, sure))
+    own = filters.Common(ImportedChannel(delay=0.85 * LATE), (forces,))
+    theirs = filters.Common(ImportedChannel(delay=LATE), (others,))
+    found = filters.alike(own, theirs)
+    assert [one.channel.delay for one in found] == pytest.approx([said * LATE] * 2)
+
+
+@pytest.mark.usefixtures("weighed")
 @pytest.mark.parametrize(
     ("other", "said"), [(Wanted(0.1, 200.0, missed=0.06), 1.0), (Wanted(0.1, 200.0), 0.0)]
 )
@@ -149,10 +160,14 @@ def test_other_readings_are_as_late_as_forces_unless_one_that_fits_speaks_agains
 
 @pytest.mark.usefixtures("weighed")
 @pytest.mark.parametrize(
-    ("master", "said"), [(Wanted(1.0, 50.0), 1.0), (Wanted(1.3, 5000.0), 1.3)], ids=["apart", "agree"]
+    ("master", "sure", "said"),
+    [(Wanted(1.0, 50.0), 100.0, 1.0), (Wanted(1.3, 5000.0), 100.0, 1.3), (Wanted(1.3, 5000.0), 500.0, 1.3)],
+    ids=["apart", "agree", "against all"],
 )
-def test_the_building_decides_where_a_laboratory_allows_its_delay(master: Wanted, said: float) -> None:
-    *laboratories, building = readings(master, Wanted(1.3, 5000.0), Wanted(1.0, 100.0))
+def test_the_building_decides_where_a_laboratory_allows_its_delay(
+    master: Wanted, sure: float, said: float
+) -> None:
+    *laboratories, building = readings(master, Wanted(1.3, 5000.0), Wanted(1.0, sure))
     found = filters.of_forces(laboratories, [building])
     assert found.channel.late == pytest.approx(said * LATE)
 

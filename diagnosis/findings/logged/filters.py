@@ -59,10 +59,10 @@ class LikelyFilter(NamedTuple):
         """Largest share of a reading's rms that the nominal model leaves behind it."""
         return low_pass.missed(self.of.spectra, self.channel)
 
-    def allows(self, other: ImportedChannel) -> bool:
-        """Whether the readings are about as likely behind another one."""
+    def allows(self, other: ImportedChannel, times: float = 1.0) -> bool:
+        """Whether the readings are about as likely behind another one, with so many times the usual share to lose."""
         own = self.of.gain(self.channel)
-        return self.of.gain(other) > own - max(BEYOND, AS_LIKELY * own)
+        return self.of.gain(other) > own - max(BEYOND, times * AS_LIKELY * own)
 
     def spoken_for(self, several: Sequence[LikelyFilter]) -> bool:
         """Whether every filter of `several` that delays less allows this one."""
@@ -140,9 +140,9 @@ def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> 
     """The filter of forces: of those that the master used, or of the laboratories that agree on one.
 
     Each of `exact` is a way to see the forces that the master used, by the motion of the building; the likeliest way
-    counts. It tells the filter of the master's own converter apart, and which laboratory has an effect, but a filter
-    that all laboratories agree on less surely than they do: where none of them allows what it says, and it allows what
-    they say, theirs holds.
+    counts. It tells the filter of the master's own converter apart, and which laboratory has an effect. But noise that
+    the master read and the logger did not looks like a filter, so that where laboratories agree on one, and none of
+    them allows what it says, theirs holds.
     """
     agreed = in_common(labs, sure := likely(labs))
     tried = [(low_pass.roughly(one.spectra), one) for one in exact]
@@ -154,7 +154,7 @@ def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> 
     if low_pass.missed(own.spectra, channel) > SPOILT or low_pass.surprise_unknown(own.spectra) < said:
         return agreed  # something is at work in the building
     apart = not any(one.allows(channel) for one in sure)
-    if not (apart and agreed.by and LikelyFilter(channel, own.gain(channel), own).allows(agreed.channel)):
+    if not (apart and agreed.by):
         agreed = passed(labs, channel)
         return agreed if channel.filter is None else Common(channel, (own, *agreed.by))
     return agreed if agreed.channel.filter is None else agreed._replace(by=(own, *agreed.by))
@@ -180,16 +180,27 @@ def followed(known: Common, found: Common, labs: Sequence[AlikeReadings]) -> Com
 def alike(*groups: Common) -> tuple[Common, ...]:
     """The same groups of readings behind one filter or delay, where that of one of them is about as likely for each.
 
-    Of several such it is the likeliest one for all readings together: loggers mostly treat all channels alike.
+    Of several such it is the likeliest one for all readings together: loggers mostly treat all channels alike, so that
+    each may lose twice as much by it as they lose together.
     """
     found = [
         LikelyFilter(group.channel, one.gain(group.channel), one) for group in groups for one in group.by
     ]
     if not all(group.by for group in groups):
         return groups
-    shared = [group.channel for group in groups if all(one.allows(group.channel) for one in found)]
+    shared = [
+        group.channel
+        for group in groups
+        if all(one.allows(group.channel, 2.0) for one in found) and together(found, group.channel)
+    ]
     best = max(shared, key=lambda channel: sum(one.of.gain(channel) for one in found), default=None)
     return groups if best is None else tuple(group._replace(channel=best) for group in groups)
+
+
+def together(found: Sequence[LikelyFilter], channel: ImportedChannel) -> bool:
+    """Whether readings behind filters of their own are together about as likely behind one."""
+    own = sum(one.of.gain(one.channel) for one in found)
+    return sum(one.of.gain(channel) for one in found) > own - max(BEYOND, AS_LIKELY * own)
 
 
 def likely(labs: Sequence[AlikeReadings]) -> list[LikelyFilter]:
