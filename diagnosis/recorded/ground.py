@@ -35,6 +35,8 @@ class Ground(Measured):
         self.nuisances: tuple[Nuisance, ...] = ()
         self.candidates = of_sites(record, ("ground",), record.plan)
         self.blur = self.interpolated(rows.rate) if rows.interpolated and rows.rate > 0.0 else 0.0
+        if record.start is not None:
+            self.blur = max(self.blur, record.start.blur)
 
     def interpolated(self, rate: float) -> float:
         """Rms error (m/s²) of the plan's motion once it is sampled at `rate` (Hz) and interpolated onto the ticks."""

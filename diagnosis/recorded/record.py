@@ -70,6 +70,14 @@ class WholeTest:
     )  # systems of the other slaves as diagnosed, by role
 
 
+class Start(NamedTuple):
+    """How the ground motion that a logger shows lies to the plan's."""
+
+    late: float  # s, by which it comes later at the first tick, less than zero for earlier
+    fast: float  # s by which it comes still later, per s
+    blur: float  # m/s², rms by which straight lines and a spline between the plan's ticks differ there
+
+
 @dataclass(frozen=True)
 class Record:
     """Signals (ticks,) or (ticks, storeys) by name; a value that is missing is that of the tick before.
@@ -93,6 +101,7 @@ class Record:
     edges: tuple[
         str, ...
     ] = ()  # readings whose first or last ticks a resampling filter spoilt, which do not count
+    start: Start | None = None  # of an import whose ground motion is not on the plan's ticks
     late: Late = NOT_LATE  # by which a logger delays all channels of a kind
     # filters of channels that its import map does not state, by topic and name
     passed: Mapping[tuple[str, str], LoggerFilter] = field(default_factory=dict)

@@ -180,6 +180,13 @@ def timed(found: Diagnosis) -> list[str]:
             f"The clock of the readings is {'fast' if fast > 0.0 else 'slow'} by {1e6 * abs(fast):.2g} ppm against "
             "that of the commands: the readings were put onto the clock of the commands."
         )
+    start = found.record.start
+    if start is not None:
+        middle = start.late + 0.5 * start.fast * found.record.ticks * found.record.plan.test.interval
+        said.append(
+            f"The recorded ground motion comes {1e3 * abs(middle):.2g} ms {'later' if middle > 0.0 else 'earlier'} "
+            "than the plan's, which is less than an interval and taken for the time at which the data logger began."
+        )
     if found.record.early > 0.0:
         said.append(
             f"The readings of all laboratories stand {1e3 * found.record.early:.2g} ms before their time, as means do "
