@@ -68,7 +68,7 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
         theirs = theirs - begin
         t = np.arange(int(np.floor(theirs[-1] / interval + 1e-9)) + 1, dtype=np.float64) * interval
     between = not stands_on(theirs, t, interval)
-    rate = 0.0 if mapping.static or theirs.size < 2 else 1.0 / float(np.median(np.diff(theirs)))
+    rate = 0.0 if mapping.static else rate_of(theirs)
     known = lab_signals(mapping.plan)
     found = OnTicks(t, {}, {}, {}, begin, gaps)
     if mapping.time and not mapping.time_unit and time_unit(mapping, table) not in ("", "s"):
@@ -96,9 +96,15 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
             apart, found.values[name] = False, stairs
         else:
             found.values[name] = moved(times, values, t, row) if apart else values[nearest_rows(times, t)]
-        own_rate = rate if own.all() else 1.0 / float(np.median(np.diff(times)))
-        found.stated[name] = channel(source, row, own_rate, between=apart)
+        found.stated[name] = channel(source, row, rate if own.all() else rate_of(times), between=apart)
     return found
+
+
+def rate_of(times: Array) -> float:
+    """Rows per s, by the mean of distances that are usual: printed times are rounded, which shows in each of them."""
+    apart = np.diff(times)
+    usual = apart[apart < EVENLY * np.median(apart)] if apart.size else apart
+    return 1.0 / float(np.mean(usual)) if usual.size else 0.0
 
 
 def gaps_between(gaps: Sequence[tuple[float, float]], begin: float) -> list[tuple[float, float]]:

@@ -9,60 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.recording.imported import ImportedData, LoggerFilter, imported
+from common.recording.imported import LoggerFilter
 from common.recording.reader import read
-from common.recording.run import Run
 from diagnosis.recorded import slips
 from diagnosis.recorded.record import build
 from report.text.tabular import read_table
 from report.text.text_form import StatedForm, TextForm
-
-PLAN = '[test]\ninterval = 0.01\nduration = 1.0\n[compensator]\nkind = "none"\n'
-TIMES = 0.01 * np.arange(400)
-COMMAND = 5.0 * np.sin(2.0 * np.pi * 0.7 * TIMES)  # mm
-LATE = 5.0 * np.sin(2.0 * np.pi * 0.7 * (TIMES - 0.045))
-FORCE = 12.5 * LATE  # kN at 12.5 kN/mm
-
-
-def table(
-    head: str, *columns: Any, between: str = ",", decimal: str = ".", below: str = "", above: str = ""
-) -> str:
-    rows = (
-        between.join(f"{value:.9f}".replace(".", decimal) for value in row)
-        for row in zip(*columns, strict=True)
-    )
-    return "\n".join([*([above] if above else []), head, *([below] if below else []), *rows]) + "\n"
-
-
-def known(run: Run) -> ImportedData:
-    """The statements of a recording about its import."""
-    found = imported(run)
-    assert found is not None
-    return found
-
-
-@pytest.fixture
-def bring(call: Any, tmp_path: Path) -> Any:
-    """Import data under a map; exit code and the recording, None where there is none."""
-
-    def brought(
-        data: str, rows: str, top: str = 'time = "t"\n', *more: str, plan: str = PLAN
-    ) -> tuple[int, Run | None]:
-        (tmp_path / "plan.toml").write_text(plan)
-        (tmp_path / "data.csv").write_bytes(data.encode("latin-1"))
-        (tmp_path / "map.toml").write_text(f'plan = "plan.toml"\n{top}[signals]\n{rows}')
-        out = tmp_path / "a.mcap"
-        code = call(
-            "import", tmp_path / "data.csv", "--map", tmp_path / "map.toml", "-o", out, "--force", *more
-        )
-        return code, read(out) if code == 0 else None
-
-    return brought
-
-
-DRIVE = (
-    'actuator_command = { column = "u", unit = "mm" }\ncolumn_displacement = { column = "y", unit = "mm" }\n'
-)
+from tests.rths.imports import COMMAND, DRIVE, FORCE, LATE, PLAN, TIMES, known, table
 
 
 def test_units_give_the_scales_and_the_loggers_properties_are_kept(bring: Any) -> None:
@@ -80,43 +33,6 @@ def test_units_give_the_scales_and_the_loggers_properties_are_kept(bring: Any) -
     assert stated.high_pass == 0.5
     assert stated.rate == pytest.approx(100.0)
     assert not stated.interpolated
-
-
-def test_rows_between_the_ticks_lose_nothing_of_a_motion(bring: Any) -> None:
-    rows = np.arange(TIMES.size) / 57.0
-    wave = 10.0 * np.sin(2.0 * np.pi * 2.0 * rows)
-    code, run = bring(table("t,u,y", rows, wave, wave), DRIVE)
-    assert code == 0
-    found = run.columns["master"]["column_displacement"]
-    expected = 1e-2 * np.sin(2.0 * np.pi * 2.0 * 0.01 * np.arange(found.size))
-    assert np.max(np.abs(found - expected)[8:-8]) < 2e-6  # straight lines are off by up to 60 µm
-
-
-@pytest.mark.parametrize("begun", [0.0, 0.003, -0.003])
-def test_what_a_controller_holds_from_tick_to_tick_is_no_curve(bring: Any, begun: float) -> None:
-    rows = np.arange(850) / 205.0 + 0.1  # 2.05 rows in an interval
-    ticks = np.floor((rows + begun) / 0.01 + 1e-9)
-    steps = 5.0 * np.sin(2.0 * np.pi * 0.7 * 0.01 * ticks)
-    smooth = 5.0 * np.sin(2.0 * np.pi * 0.7 * rows)
-    code, run = bring(table("t,u,y", rows, steps, smooth), DRIVE)
-    assert code == 0
-    command = run.columns["master"]["actuator_command"]
-    expected = 5e-3 * np.sin(2.0 * np.pi * 0.7 * 0.01 * (10.0 + np.arange(command.size)))
-    assert np.max(np.abs(command - expected)[1:-1]) < 1e-9
-    assert not known(run).channel("master", "actuator_command").interpolated
-    assert known(run).channel("master", "column_displacement").interpolated
-
-
-def test_rows_between_the_ticks_are_marked(bring: Any, capsys: Any) -> None:
-    code, run = bring(table("t,u,y", 1.05 * TIMES, COMMAND, LATE), DRIVE)
-    assert code == 0
-    assert known(run).channel("master", "column_displacement").interpolated
-    said = capsys.readouterr().out
-    assert "interpolated onto the ticks, and marked so: actuator_command, column_displacement" in said
-    assert (
-        "link: the link cannot be judged, because the data hold no numbers and no time stamps of messages"
-        in said
-    )
 
 
 def test_files_with_semicolons_decimal_commas_a_preamble_and_a_row_of_units_are_read(
@@ -166,52 +82,6 @@ def test_the_form_of_a_text_file_is_recognised(
     assert list(found.columns)[:2] == columns
 
 
-def test_rows_on_the_ticks_keep_their_steps_although_times_are_not_exact(bring: Any) -> None:
-    times = TIMES + 12.34567  # whose differences are no whole multiples of an interval
-    steps = np.round(COMMAND, 1)
-    code, run = bring(table("t,u,y", times, steps, steps), DRIVE)
-    assert code == 0
-    assert not known(run).channel("master", "column_displacement").interpolated
-    assert set(np.unique(run.columns["master"]["column_displacement"])) == set(np.unique(1e-3 * steps))
-
-
-SLOW = 0.03 * np.arange(134) + 0.004  # s, rows of a channel with a clock of its own
-OTHER_RATES = {
-    "half as often": (TIMES, slice(1, None, 2), 50.0),
-    "of two loggers": (np.unique(np.r_[TIMES, SLOW]), None, 1.0 / 0.03),
-}
-
-
-@pytest.mark.parametrize("case", OTHER_RATES)
-def test_a_channel_with_a_rate_of_its_own_has_empty_cells(bring: Any, case: str) -> None:
-    times, rows, rate = OTHER_RATES[case]
-    motion = 5.0 * np.sin(2.0 * np.pi * 0.7 * times)
-    read = np.full(times.size, np.nan)
-    there = np.isin(times, SLOW) if rows is None else rows
-    read[there] = motion[there]
-    commanded = np.where(np.isin(times, TIMES), motion, np.nan)
-    text = table("t,u,y", times, commanded, read).replace("nan", "")
-    code, run = bring(text, DRIVE)
-    assert code == 0
-    ticks = run.columns["master"]["t"]
-    found = run.columns["master"]["column_displacement"]
-    inside = (ticks > 0.1) & (ticks < 3.9)
-    expected = 5e-3 * np.sin(2.0 * np.pi * 0.7 * ticks)
-    assert np.max(np.abs(found - expected)[inside]) < 2e-7
-    assert run.columns["master"]["actuator_command"] == pytest.approx(expected, abs=1e-11)
-    channels = [known(run).channel("master", name) for name in ("column_displacement", "actuator_command")]
-    assert [one.interpolated for one in channels] == [True, False]
-    assert [one.rate for one in channels] == pytest.approx([rate, 100.0])
-
-
-@pytest.mark.parametrize("holes", [slice(200, 201), slice(200, 260), slice(0, 30), slice(380, None)])
-def test_a_channel_with_a_hole_is_refused(bring: Any, capsys: Any, holes: slice) -> None:
-    read = LATE.copy()
-    read[holes] = np.nan
-    assert bring(table("t,u,y", TIMES, COMMAND, read).replace("nan", ""), DRIVE)[0] == 2
-    assert "column 'y' has no number in row" in capsys.readouterr().err
-
-
 def test_start_and_stop_select_a_part_of_the_data(bring: Any) -> None:
     code, run = bring(table("t,u,y", TIMES, COMMAND, LATE), DRIVE, 'time = "t"\nstart = 1.0\nstop = 2.0\n')
     assert code == 0
@@ -227,23 +97,6 @@ def test_static_data_keep_their_rows_and_need_no_time(bring: Any) -> None:
     assert known(run).static
     assert run.ticks("master") == 400
     assert not known(run).channel("master", "column_displacement").interpolated
-
-
-def test_sequence_numbers_are_held_between_rows_and_incomplete_time_stamps_are_left_out(
-    bring: Any, capsys: Any
-) -> None:
-    numbers = np.floor(TIMES / 0.02)
-    rows = (
-        DRIVE
-        + 'damper_force_seq = { column = "n" }\ncommand_seq = { column = "n" }\ncommand_one_way = { column = "w" }\n'
-    )
-    text = table("t,u,y,n,w", 1.01 * TIMES, COMMAND, LATE, numbers, 1e-3 + 0.0 * TIMES)
-    code, run = bring(text, rows)
-    assert code == 0
-    assert set(np.unique(run.columns["master"]["damper_force_seq"])) <= set(range(200))
-    assert np.all(run.columns["latency"]["command_one_way"] == 1e-3)
-    assert np.all(np.isnan(run.columns["latency"]["round_trip"]))
-    assert "link:" not in capsys.readouterr().out
 
 
 SLIPS = {

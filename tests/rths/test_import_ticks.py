@@ -1,0 +1,117 @@
+"""The rows of a data file on the ticks of a plan: between them, at rates of their own, held, and with holes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.rths.imports import COMMAND, DRIVE, LATE, TIMES, known, table
+
+
+def test_rows_between_the_ticks_lose_nothing_of_a_motion(bring: Any) -> None:
+    rows = np.arange(TIMES.size) / 57.0
+    wave = 10.0 * np.sin(2.0 * np.pi * 2.0 * rows)
+    code, run = bring(table("t,u,y", rows, wave, wave), DRIVE)
+    assert code == 0
+    found = run.columns["master"]["column_displacement"]
+    expected = 1e-2 * np.sin(2.0 * np.pi * 2.0 * 0.01 * np.arange(found.size))
+    assert np.max(np.abs(found - expected)[8:-8]) < 2e-6  # straight lines are off by up to 60 µm
+
+
+def test_the_rate_of_rows_is_that_of_all_although_their_times_are_rounded(bring: Any) -> None:
+    times = np.delete(np.round(np.arange(400) / 1024.0 * 10.0, 3), [40, 41, 90])
+    code, run = bring(table("t,u,y", times, COMMAND[: times.size], LATE[: times.size]), DRIVE)
+    assert code == 0
+    assert known(run).channel("master", "column_displacement").rate == pytest.approx(102.4, rel=2e-4)
+
+
+@pytest.mark.parametrize("begun", [0.0, 0.003, -0.003])
+def test_what_a_controller_holds_from_tick_to_tick_is_no_curve(bring: Any, begun: float) -> None:
+    rows = np.arange(850) / 205.0 + 0.1  # 2.05 rows in an interval
+    ticks = np.floor((rows + begun) / 0.01 + 1e-9)
+    steps = 5.0 * np.sin(2.0 * np.pi * 0.7 * 0.01 * ticks)
+    smooth = 5.0 * np.sin(2.0 * np.pi * 0.7 * rows)
+    code, run = bring(table("t,u,y", rows, steps, smooth), DRIVE)
+    assert code == 0
+    command = run.columns["master"]["actuator_command"]
+    expected = 5e-3 * np.sin(2.0 * np.pi * 0.7 * 0.01 * (10.0 + np.arange(command.size)))
+    assert np.max(np.abs(command - expected)[1:-1]) < 1e-9
+    assert not known(run).channel("master", "actuator_command").interpolated
+    assert known(run).channel("master", "column_displacement").interpolated
+
+
+def test_rows_between_the_ticks_are_marked(bring: Any, capsys: Any) -> None:
+    code, run = bring(table("t,u,y", 1.05 * TIMES, COMMAND, LATE), DRIVE)
+    assert code == 0
+    assert known(run).channel("master", "column_displacement").interpolated
+    said = capsys.readouterr().out
+    assert "interpolated onto the ticks, and marked so: actuator_command, column_displacement" in said
+    assert (
+        "link: the link cannot be judged, because the data hold no numbers and no time stamps of messages"
+        in said
+    )
+
+
+def test_rows_on_the_ticks_keep_their_steps_although_times_are_not_exact(bring: Any) -> None:
+    times = TIMES + 12.34567  # whose differences are no whole multiples of an interval
+    steps = np.round(COMMAND, 1)
+    code, run = bring(table("t,u,y", times, steps, steps), DRIVE)
+    assert code == 0
+    assert not known(run).channel("master", "column_displacement").interpolated
+    assert set(np.unique(run.columns["master"]["column_displacement"])) == set(np.unique(1e-3 * steps))
+
+
+SLOW = 0.03 * np.arange(134) + 0.004  # s, rows of a channel with a clock of its own
+OTHER_RATES = {
+    "half as often": (TIMES, slice(1, None, 2), 50.0),
+    "of two loggers": (np.unique(np.r_[TIMES, SLOW]), None, 1.0 / 0.03),
+}
+
+
+@pytest.mark.parametrize("case", OTHER_RATES)
+def test_a_channel_with_a_rate_of_its_own_has_empty_cells(bring: Any, case: str) -> None:
+    times, rows, rate = OTHER_RATES[case]
+    motion = 5.0 * np.sin(2.0 * np.pi * 0.7 * times)
+    read = np.full(times.size, np.nan)
+    there = np.isin(times, SLOW) if rows is None else rows
+    read[there] = motion[there]
+    commanded = np.where(np.isin(times, TIMES), motion, np.nan)
+    text = table("t,u,y", times, commanded, read).replace("nan", "")
+    code, run = bring(text, DRIVE)
+    assert code == 0
+    ticks = run.columns["master"]["t"]
+    found = run.columns["master"]["column_displacement"]
+    inside = (ticks > 0.1) & (ticks < 3.9)
+    expected = 5e-3 * np.sin(2.0 * np.pi * 0.7 * ticks)
+    assert np.max(np.abs(found - expected)[inside]) < 2e-7
+    assert run.columns["master"]["actuator_command"] == pytest.approx(expected, abs=1e-11)
+    channels = [known(run).channel("master", name) for name in ("column_displacement", "actuator_command")]
+    assert [one.interpolated for one in channels] == [True, False]
+    assert [one.rate for one in channels] == pytest.approx([rate, 100.0])
+
+
+@pytest.mark.parametrize("holes", [slice(200, 201), slice(200, 260), slice(0, 30), slice(380, None)])
+def test_a_channel_with_a_hole_is_refused(bring: Any, capsys: Any, holes: slice) -> None:
+    read = LATE.copy()
+    read[holes] = np.nan
+    assert bring(table("t,u,y", TIMES, COMMAND, read).replace("nan", ""), DRIVE)[0] == 2
+    assert "column 'y' has no number in row" in capsys.readouterr().err
+
+
+def test_sequence_numbers_are_held_between_rows_and_incomplete_time_stamps_are_left_out(
+    bring: Any, capsys: Any
+) -> None:
+    numbers = np.floor(TIMES / 0.02)
+    rows = (
+        DRIVE
+        + 'damper_force_seq = { column = "n" }\ncommand_seq = { column = "n" }\ncommand_one_way = { column = "w" }\n'
+    )
+    text = table("t,u,y,n,w", 1.01 * TIMES, COMMAND, LATE, numbers, 1e-3 + 0.0 * TIMES)
+    code, run = bring(text, rows)
+    assert code == 0
+    assert set(np.unique(run.columns["master"]["damper_force_seq"])) <= set(range(200))
+    assert np.all(run.columns["latency"]["command_one_way"] == 1e-3)
+    assert np.all(np.isnan(run.columns["latency"]["round_trip"]))
+    assert "link:" not in capsys.readouterr().out
