@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import linalg, signal
 
 from models.registry import Array
 
@@ -18,6 +17,8 @@ def within(length: float, time_constant: float, damping: float) -> Array:
     With a damping ratio ζ it is one of second order, (T/2ζ)²·ü + T·u̇ + u = F, of first order if that is infinite. The
     time constant T (s) is above zero, and the rate of a motor of first order is left zero.
     """
+    from scipy import linalg
+
     rates = np.zeros((4, 4))
     rates[INTEGRAL, FORCE] = 1.0
     if math.isinf(damping):
@@ -38,6 +39,8 @@ def states(command: Array, interval: float, time_constant: float, damping: float
     if time_constant == 0.0:
         held = np.concatenate([[0.0], command[:-1]])
         return np.stack([held, np.zeros_like(held), command])
+    from scipy import signal
+
     step = within(interval, time_constant, damping)
     own, driven = step[:COMMAND, :COMMAND], step[:COMMAND, COMMAND:INTEGRAL]
     above, below = signal.ss2tf(own, driven, np.eye(COMMAND), np.zeros((COMMAND, 1)))

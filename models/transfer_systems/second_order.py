@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg import expm
 
 from models.compiled import jit
 from models.registry import Array
@@ -32,6 +31,8 @@ def propagators(gain: float, time_constant: float, damping: float, lengths: Arra
     if math.isinf(damping) or time_constant == 0.0:
         rows[:, :3] = first_order.propagators(gain, time_constant, lengths)
         return rows
+    from scipy.linalg import expm
+
     omega = 2.0 * damping / time_constant
     for row, length in zip(rows, lengths.tolist(), strict=True):
         rates = np.zeros((4, 4))  # of output, its rate, input, and the input's rate
