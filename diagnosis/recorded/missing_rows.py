@@ -48,7 +48,7 @@ def missed(values: Array, t: Array, begin: float, end: float) -> float:
 
     In the middle of as long a time elsewhere all but a twentieth of such lines miss no more.
     """
-    half, most = math.ceil(0.5 * (end - begin) / (t[1] - t[0]) - 1e-6), float(np.std(values))
+    half, most = max(1, math.ceil(0.5 * (end - begin) / (t[1] - t[0]) - 1e-6)), float(np.std(values))
     if values.size < FEWEST * half:
         return most
     middle = values[half:-half] - 0.5 * (values[: -2 * half] + values[2 * half :])

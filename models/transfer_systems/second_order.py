@@ -13,11 +13,8 @@ from models.compiled import jit
 from models.registry import Array
 from models.transfer_systems import first_order
 
-OUTPUT, RATE, COLUMNS = (
-    0,
-    4,
-    8,
-)  # first columns of the rows for the output and for its rate, and how many there are
+# first columns of the rows for the output and for its rate, and how many there are
+OUTPUT, RATE, COLUMNS = 0, 4, 8
 
 
 def propagators(gain: float, time_constant: float, damping: float, lengths: Array) -> Array:

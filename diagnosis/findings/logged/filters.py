@@ -32,6 +32,9 @@ SPOILT = 0.05
 ANY_GAIN = 0.1  # relative tolerance of a reading's gain, which says nothing of a filter
 # Share of what a filter gains in a laboratory that another one may lose there: of a delay, a seventh more or less.
 AS_LIKELY = 0.02
+EACH = (
+    2.0  # times that share, which each of several readings may lose where together they lose no more than it
+)
 
 
 class AlikeReadings(NamedTuple):
@@ -191,7 +194,7 @@ def alike(*groups: Common) -> tuple[Common, ...]:
     shared = [
         group.channel
         for group in groups
-        if all(one.allows(group.channel, 2.0) for one in found) and together(found, group.channel)
+        if all(one.allows(group.channel, EACH) for one in found) and together(found, group.channel)
     ]
     best = max(shared, key=lambda channel: sum(one.of.gain(channel) for one in found), default=None)
     return groups if best is None else tuple(group._replace(channel=best) for group in groups)

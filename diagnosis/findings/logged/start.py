@@ -1,8 +1,8 @@
 """When a data logger began against the plan's ground motion, and how fast its clock ran.
 
 A logger rarely begins with the first tick of a test. What it shows of the ground motion then lies between the ticks of
-the plan's, as all other channels do. No machine can do that, and an error of the motion itself is no smaller part of an
-interval than none, since a master reads it tick by tick.
+the plan's, as all its other channels do. No machine can cause that. A master reads the motion tick by tick, so that an
+error of its own moves it by whole intervals.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from common.recording.imported import ImportedData
 from common.roles import MASTER
 from diagnosis.recorded.record import LEAST_TICKS, Record, Start
 from diagnosis.signals import clock
@@ -37,8 +36,7 @@ def begun(record: Record) -> Record:
     if record.ticks < LEAST_TICKS:
         return record
     interval, measured = record.plan.test.interval, record.signals[name]
-    rows = (record.stated or ImportedData("")).channel(MASTER, name)
-    believed = rows.through(record.ground[0], interval)
+    believed = record.stated.channel(MASTER, name).through(record.ground[0], interval)
     found = least(measured, believed, record.present[name])
     if found is None:
         return record
