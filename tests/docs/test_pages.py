@@ -86,6 +86,7 @@ UNRUN = {
         "rths blind --set loggers --seed 9668 --cases 30 --only clean --duration 12",
         "rths blind --set loggers --seed 9669 --cases 30 --only catalogue --duration 12",
         "rths blind --set loggers --seed 9670 --cases 30 --only clean --duration 12",
+        "rths blind --set loggers --seed 9671 --cases 30 --only catalogue --duration 12",
         "rths blind --set loggers --seed 9777 --cases 90 --only catalogue --duration 12",
         "rths blind --set independent --seed 7333 --cases 30 --duration 12",
         "rths blind --set independent --seed 7444 --cases 18 --duration 12",
