@@ -70,7 +70,7 @@ class WholeTest:
     )  # systems of the other slaves as diagnosed, by role
 
 
-class Start(NamedTuple):
+class LoggerStart(NamedTuple):
     """How the ground motion that a logger shows lies to the plan's."""
 
     late: float  # s, by which it comes later at the first tick, less than zero for earlier
@@ -101,7 +101,7 @@ class Record:
     edges: tuple[
         str, ...
     ] = ()  # readings whose first or last ticks a resampling filter spoilt, which do not count
-    start: Start | None = None  # of an import whose ground motion is not on the plan's ticks
+    start: LoggerStart | None = None  # of an import whose ground motion is not on the plan's ticks
     late: Late = NOT_LATE  # by which a logger delays all channels of a kind
     # filters of channels that its import map does not state, by topic and name
     passed: Mapping[tuple[str, str], LoggerFilter] = field(default_factory=dict)

@@ -56,3 +56,12 @@ def test_a_further_law_of_one_as_good_is_kept_where_it_brings_nominal_parameters
     monkeypatch.setattr(trade, "begun", lambda item, modelled: [bent] if item is rival else [])
     monkeypatch.setattr(trade, "fitted", lambda item, *_: item)
     assert trade.in_further_laws(fit({"b": {}}, off), [rival]) == [bent] * kept
+
+
+def test_a_further_law_that_brings_nominal_parameters_back_is_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen, bent = fit({"a": {}}, 4.0), fit({"a": {"law": 1.0}}, 0.3)
+    for name in ("joined", "alone", "under_others", "afresh", "parted", "paired", "released"):
+        monkeypatch.setattr(trade, name, lambda *_: [])
+    monkeypatch.setattr(trade, "freedom", lambda item: (1, 1))
+    monkeypatch.setattr(trade, "in_further_laws", lambda *_: [bent])
+    assert trade.traded(fit({}, 9.0), chosen, [], None, 3)[0] is bent  # type: ignore[arg-type]

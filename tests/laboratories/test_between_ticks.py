@@ -12,9 +12,22 @@ from scipy import signal
 from common.plan.plan import Plan
 from common.recording.imported import LoggerFilter, later
 from laboratories.table import between
+from models.registry import Array
 from models.system import System
 
-TICKS, FINER = 1500, 100
+TICKS, FINER, SETTLED = 1500, 100, 100
+
+
+def behind_filter(finely: Array, bend: Array, interval: float) -> tuple[float, float]:
+    """Rms of what a logger's filter sees of a signal (ticks·FINER,) beyond its ticks, and of what a bend leaves of it.
+
+    `bend` (ticks,) is added at the ticks. The first `SETTLED` ticks, in which the filter settles, do not count.
+    """
+    low_pass, settled = LoggerFilter("bessel", 4, 90.0), slice(SETTLED, -5)
+    seen = low_pass.filtered(finely, interval / FINER)[::FINER]
+    at_ticks = low_pass.filtered(finely[::FINER], interval)
+    bent = low_pass.filtered(finely[::FINER] + bend, interval)
+    return float(np.std((seen - at_ticks)[settled])), float(np.std((seen - bent)[settled]))
 
 
 @pytest.mark.parametrize(("lag", "share_left"), [(0.0, 0.02), (1e-3, 0.005), (3e-3, 0.005)])
@@ -31,11 +44,7 @@ def test_a_filter_sees_the_force_of_a_motor_whose_command_is_held(lag: float, sh
     for place in range(1, force.size):
         now += step * (command[(place - 1) // FINER] - now)
         force[place] = now
-    low_pass = LoggerFilter("bessel", 4, 90.0)
-    seen = low_pass.filtered(force, interval / FINER)[::FINER]
-    at_ticks = low_pass.filtered(force[::FINER], interval)
-    bent = low_pass.filtered(force[::FINER] + between.motor_bend(system, command), interval)
-    missed, left = (float(np.std((seen - one)[50:-5])) for one in (at_ticks, bent))
+    missed, left = behind_filter(force, between.motor_bend(system, command), interval)
     assert left < share_left * missed
 
 
@@ -65,11 +74,7 @@ def test_a_filter_sees_the_acceleration_of_a_table_whose_command_is_ramped(delay
     omega = 2.0 * np.pi * table.frequency
     loop = signal.lti([omega**2, 0.0, 0.0], [1.0, 2.0 * table.damping_ratio * omega, omega**2])
     acceleration = signal.lsim(loop, reached, finely)[1]
-    low_pass = LoggerFilter("bessel", 4, 90.0)
-    seen = low_pass.filtered(acceleration, interval / FINER)[::FINER]
-    at_ticks = low_pass.filtered(acceleration[::FINER], interval)
-    bent = low_pass.filtered(acceleration[::FINER] + between.acceleration_bend(system, command), interval)
-    missed, left = (float(np.std((seen - one)[100:-5])) for one in (at_ticks, bent))
+    missed, left = behind_filter(acceleration, between.acceleration_bend(system, command), interval)
     assert left < 0.1 * missed
 
 
@@ -84,11 +89,7 @@ def test_a_filter_sees_the_force_of_a_motor_of_second_order() -> None:
     omega, finely = 1.2 / lag, interval / FINER * np.arange(TICKS * FINER)
     held = np.repeat(command, FINER)
     force = signal.lsim(([omega**2], [1.0, 1.2 * omega, omega**2]), held, finely, interp=False)[1]
-    low_pass = LoggerFilter("bessel", 4, 90.0)
-    seen = low_pass.filtered(force, interval / FINER)[::FINER]
-    at_ticks = low_pass.filtered(force[::FINER], interval)
-    bent = low_pass.filtered(force[::FINER] + between.motor_bend(system, command), interval)
-    missed, left = (float(np.std((seen - one)[50:-5])) for one in (at_ticks, bent))
+    missed, left = behind_filter(force, between.motor_bend(system, command), interval)
     assert left < 0.1 * missed
     inside = force[FINER // 4 :: FINER] - later(force[::FINER], -0.25)
     bend = between.motor_bend(system, command, 0.25)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from common.roles import MASTER
-from diagnosis.recorded.record import LEAST_TICKS, Record, Start
+from diagnosis.recorded.record import LEAST_TICKS, LoggerStart, Record
 from diagnosis.signals import clock
 from diagnosis.signals.mask import Mask
 from models.registry import Array
@@ -45,7 +45,7 @@ def begun(record: Record) -> Record:
     smoothly = left(measured - smooth, record.present[name]) < left(measured - straight, record.present[name])
     ground = np.stack([moved(row, found, smoothly) for row in record.ground])
     blur = float(np.sqrt(np.mean(np.square(smooth - straight))))
-    return replace(record, ground=ground, start=Start(late * interval, fast, blur))
+    return replace(record, ground=ground, start=LoggerStart(late * interval, fast, blur))
 
 
 def least(measured: Array, believed: Array, there: Mask) -> tuple[float, float] | None:
