@@ -121,7 +121,7 @@ def of_second_order() -> Parameter:
         least=0.2,
         most=2.0,
         sizes=(0.7,),
-        says="ratio of the loop of law 1, with which its time constant is 2ζ/ω",
+        says="damping ratio ζ of law 1, whose time constant is 2ζ/ω",
         shape=True,
     )
 
