@@ -20,8 +20,8 @@ from report.text.text_form import TextForm
 if TYPE_CHECKING:
     from common.plan.plan import Plan
     from recorder.files import MotionRows
-    from rths.examine.import_map import ImportMap, Known
-    from rths.examine.onto_ticks import OnTicks
+    from rths.examine.importing.import_map import ImportMap, Known
+    from rths.examine.importing.onto_ticks import OnTicks
 
 UNJUDGED = "the link cannot be judged, because the data hold no numbers and no time stamps of messages"
 
@@ -52,8 +52,8 @@ def run(args: argparse.Namespace) -> int:
     outputs.checked(args.output, args.force, inputs)
     with Progress("importing"):
         from report.text import tabular
-        from rths.examine.import_map import load_map
-        from rths.examine.onto_ticks import on_ticks
+        from rths.examine.importing.import_map import load_map
+        from rths.examine.importing.onto_ticks import on_ticks
 
         mapping = load_map(args.map)
         table = tabular.read_table(args.data, mapping.form)
@@ -91,7 +91,7 @@ def show(
 
     `unread` says why the plan's ground motion could not be read, if so.
     """
-    from rths.examine.import_map import lab_signals
+    from rths.examine.importing.import_map import lab_signals
 
     known, present = lab_signals(mapping.plan), list(found.values)
     judged = exchange(mapping)
@@ -101,6 +101,7 @@ def show(
         report = {"file": str(args.output), "ticks": found.t.size, "signals": present, "absent": absent}
         report |= {
             "interpolated": found.interpolated,
+            "clock": found.clock and {"begin": found.clock.begin, "fast": found.clock.fast},
             "link": "judged" if judged else UNJUDGED,
             "units": found.units,
             "gaps": found.gaps,
@@ -122,6 +123,8 @@ def show(
         say(f"units, from the row below the names: {', '.join(units)}\n")
     if found.interpolated:
         say(f"interpolated onto the ticks, and marked so: {', '.join(found.interpolated)}\n")
+    if found.clock and found.clock.between:
+        say(f"{found.clock.told}\n")
     if found.gaps:
         begin, end = max(found.gaps, key=lambda gap: gap[1] - gap[0])
         more = f", and in {len(found.gaps) - 1} shorter gaps" if found.gaps[1:] else ""
@@ -136,7 +139,7 @@ def show(
 
 def exchange(mapping: ImportMap) -> bool:
     """Whether numbers or stamps of messages are among the signals."""
-    from rths.examine.import_map import STAMPS, lab_signals
+    from rths.examine.importing.import_map import STAMPS, lab_signals
 
     known = lab_signals(mapping.plan)
     rows = [known[name][1] for name in mapping.signals]
@@ -158,7 +161,7 @@ def write(
     """
     from common.recording.imported import IMPORT, ImportedData
     from common.recording.writer import Recording
-    from rths.examine.import_map import lab_signals
+    from rths.examine.importing.import_map import lab_signals
 
     known = lab_signals(mapping.plan)
     given: dict[str, list[str]] = {}
@@ -186,7 +189,7 @@ def write(
 
 def columns_of(topic: str, names: list[str], found: OnTicks, known: Known) -> dict[Signal, list[Any]]:
     """The fields of a topic with their values; time stamps belong together, so that missing ones hold NaN."""
-    from rths.examine.import_map import STAMPS
+    from rths.examine.importing.import_map import STAMPS
 
     columns: dict[Signal, list[Any]] = {signals.SEQ: list(range(found.t.size))}
     if kind_of(topic) == LATENCY:

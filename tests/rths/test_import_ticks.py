@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.rths.imports import COMMAND, DRIVE, LATE, TIMES, known, table
+from tests.rths.imports import COMMAND, DRIVE, LATE, PLAN, TIMES, known, table
 
 
 def test_rows_between_the_ticks_lose_nothing_of_a_motion(bring: Any) -> None:
@@ -28,7 +29,9 @@ def test_the_rate_of_rows_is_that_of_all_although_their_times_are_rounded(bring:
 
 
 @pytest.mark.parametrize("begun", [0.0, 0.003, -0.003])
-def test_what_a_controller_holds_from_tick_to_tick_is_no_curve(bring: Any, begun: float) -> None:
+def test_what_a_controller_holds_is_no_curve_and_tells_when_its_ticks_are(
+    begun: float, bring: Any, capsys: Any
+) -> None:
     rows = np.arange(850) / 205.0 + 0.1  # 2.05 rows in an interval
     ticks = np.floor((rows + begun) / 0.01 + 1e-9)
     steps = 5.0 * np.sin(2.0 * np.pi * 0.7 * 0.01 * ticks)
@@ -38,8 +41,34 @@ def test_what_a_controller_holds_from_tick_to_tick_is_no_curve(bring: Any, begun
     command = run.columns["master"]["actuator_command"]
     expected = 5e-3 * np.sin(2.0 * np.pi * 0.7 * 0.01 * (10.0 + np.arange(command.size)))
     assert np.max(np.abs(command - expected)[1:-1]) < 1e-9
+    read = run.columns["master"]["column_displacement"]
+    true = 5e-3 * np.sin(2.0 * np.pi * 0.7 * (0.1 - begun + 0.01 * np.arange(read.size)))
+    assert np.max(np.abs(read - true)[2:-2]) < 2e-6  # within a tenth of a millisecond
+    side = f"its first tick is 3 ms {'before' if begun > 0.0 else 'after'} the first row"
+    assert (side in capsys.readouterr().out) == (begun != 0.0)
     assert not known(run).channel("master", "actuator_command").interpolated
     assert known(run).channel("master", "column_displacement").interpolated
+
+
+def test_the_ground_motion_tells_the_ticks_of_a_slower_logger(bring: Any, tmp_path: Path) -> None:
+    ground = np.sin(2.0 * np.pi * TIMES) * (TIMES < 3.5)
+    (tmp_path / "motion.csv").write_text(table("time (s),acceleration (m/s2)", TIMES, ground))
+    rows = 0.003 + np.arange(95) / 27.0  # s, of which the logger knows the differences
+    ticks = np.floor(rows / 0.01).astype(int)
+    computed = 5.0 * np.sin(2.0 * np.pi * 0.7 * TIMES[ticks])
+    read = 5.0 * np.sin(2.0 * np.pi * 0.7 * rows)
+    data = table("t,a,x,y", rows - rows[0], ground[ticks], computed, read)
+    columns = (
+        'ground_acceleration = { column = "a" }\ndisplacement = { column = "x", unit = "mm" }\n'
+        'column_displacement = { column = "y", unit = "mm" }\n'
+    )
+    code, run = bring(data, columns, plan=f"{PLAN}[ground_motion]\nrecord = 'motion.csv'\nscale = 1.0\n")
+    assert code == 0
+    found = run.columns["master"]
+    expected = 5e-3 * np.sin(2.0 * np.pi * 0.7 * found["t"])
+    for name in ("displacement", "column_displacement"):
+        assert np.max(np.abs(found[name] - expected)[8:-8]) < 2e-5  # 3 ms would be 7e-5
+    assert known(run).channel("master", "displacement").interpolated
 
 
 def test_rows_between_the_ticks_are_marked(bring: Any, capsys: Any) -> None:

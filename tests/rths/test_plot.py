@@ -13,8 +13,8 @@ from common.roles import SLAVE
 from report.pictures import PICTURES
 from report.text import tabular
 from rths.examine import import_, plot
-from rths.examine.import_map import load_map
-from rths.examine.onto_ticks import on_ticks
+from rths.examine.importing.import_map import load_map
+from rths.examine.importing.onto_ticks import on_ticks
 from tests.helpers import ROOT
 from tests.rths.pictures.made_up import RECORD, made_up
 

@@ -13,8 +13,8 @@ from common.recording.reader import read
 from report.text import tabular
 from rths.examine import import_
 from rths.examine.diagnose import diagnose_file
-from rths.examine.import_map import load_map
-from rths.examine.onto_ticks import on_ticks
+from rths.examine.importing.import_map import load_map
+from rths.examine.importing.onto_ticks import on_ticks
 from tests.helpers import ROOT
 
 EXAMPLES = ROOT / "examples" / "real_data"

@@ -20,7 +20,7 @@ from report.pictures import PICTURES
 from report.pictures.figure import figure
 from rths.examine import layout
 from rths.examine.export import flat
-from rths.examine.import_map import lab_signals
+from rths.examine.importing.import_map import lab_signals
 from tests.rths import sines
 
 A, B = "column A", "column B"

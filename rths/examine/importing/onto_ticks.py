@@ -5,27 +5,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from common.errors import InputError, PlanError
+from common.plan.plan import Plan
+from common.plan.read import with_test
 from common.plan.schema import nearest
 from common.recording.imported import ImportedChannel
+from common.roles import MASTER
 from common.signals import TIME, FieldType, Signal
 from models.registry import Array
 from report.text.tabular import DataTable
-from rths.examine.import_map import ImportMap, SignalSource, in_unit, lab_signals
+from rths.examine.importing.controller_clock import ControllerClock, clock_by_ground, clock_of
+from rths.examine.importing.import_map import ImportMap, SignalSource, in_unit, lab_signals
 
 # Distance of rows over the plan's interval, and the plan's interval over it, from which on the time has another unit:
 # milliseconds for seconds make 1000, while minutes make 60 and an oscilloscope has a hundred rows in an interval.
 FAR_APART, TOO_CLOSE = 90.0, 900.0
 GAP = 4.5  # usual distances of rows from which on rows are missing between two: more than three of them
 FOR_A_SPLINE = 4  # rows at least
-# Of a channel that holds its value from tick to tick: rows at least in an interval, share of the ticks at which it
-# changes at least, and share of its changes that may come sooner, where rows are missing.
-ROWS_HELD, CHANGING, TOO_SOON = 2, 0.5, 0.01
+FAST = (
+    1.03  # rows in an interval from which on each tick has one that shows whether a channel holds its value
+)
 EVENLY = 1.5  # usual distances of a channel's own rows, from which on one is missing
 ON_TICKS = 1e-3  # of an interval, within which a row is on its tick: times in a text file are rounded to a microsecond
 
@@ -40,11 +44,37 @@ class OnTicks:
     units: dict[str, str]  # taken from the file's row of units, by our name
     begin: float = 0.0  # s, the time of the first row in the data
     gaps: tuple[tuple[float, float], ...] = ()  # s in the data's own time, between which rows are missing
+    clock: ControllerClock | None = None  # of the controller, where what it holds tells it
 
     @property
     def interpolated(self) -> list[str]:
         """The signals whose rows were not on the ticks."""
         return [name for name, row in self.stated.items() if row.interpolated]
+
+
+class Ticks(NamedTuple):
+    """The ticks on which signals are wanted."""
+
+    t: Array  # s, by the controller
+    interval: float  # s
+    clock: ControllerClock | None  # of the controller, where the data tell it
+
+    def read(self, times: Array, values: Array, row: Signal, *, computed: bool) -> tuple[Array, bool]:
+        """What a channel (n,) with rows at times (n,), s, has at the ticks, and whether that lies between its rows.
+
+        A controller `computed` it, or it was read by a converter of the logger.
+        """
+        clock, places = self.clock, self.t
+        if clock is not None:
+            places, slow = clock.ticks(self.t), rate_of(times) * self.interval < FAST
+            if row.kind is FieldType.INDEX:
+                return clock.latest(times, values, self.t), not stands_on(times, places, self.interval)
+            if computed and slow:
+                places, (times, values) = self.t, clock.seen(times, values)
+            elif not slow and clock.holds(times, values):
+                return clock.held(times, values, self.t), False
+        apart = not stands_on(times, places, self.interval)
+        return (moved(times, values, places, row) if apart else values[nearest_rows(times, places)]), apart
 
 
 def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = False) -> OnTicks:
@@ -67,10 +97,13 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
         gaps, begin = missing_rows(theirs), float(theirs[0])
         theirs = theirs - begin
         t = np.arange(int(np.floor(theirs[-1] / interval + 1e-9)) + 1, dtype=np.float64) * interval
-    between = not stands_on(theirs, t, interval)
+    clock = None if mapping.static else controllers(mapping, table, data, theirs, rows)
+    if clock is not None:  # and no tick after the last row
+        t = np.arange(int(clock.places(theirs[-1:])[0] + ON_TICKS) + 1, dtype=np.float64) * interval
+    ticks = Ticks(t, interval, clock)
     rate = 0.0 if mapping.static else rate_of(theirs)
-    known = lab_signals(mapping.plan)
-    found = OnTicks(t, {}, {}, {}, begin, gaps)
+    known, computed = lab_signals(mapping.plan), of_controller(mapping.plan)
+    found = OnTicks(t, {}, {}, {}, begin, gaps, clock)
     if mapping.time and not mapping.time_unit and time_unit(mapping, table) not in ("", "s"):
         found.units["time"] = time_unit(mapping, table)
     for name, source in mapping.signals.items():
@@ -90,14 +123,65 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
         if unit:
             found.units[name] = unit
         times, values = theirs[own], scale * column[own] + source.offset
-        apart = between if own.all() else not stands_on(times, t, interval)
-        stairs = None if mapping.static else held(times, values, t, interval)
-        if stairs is not None:
-            apart, found.values[name] = False, stairs
-        else:
-            found.values[name] = moved(times, values, t, row) if apart else values[nearest_rows(times, t)]
+        found.values[name], apart = ticks.read(times, values, row, computed=name in computed)
         found.stated[name] = channel(source, row, rate if own.all() else rate_of(times), between=apart)
     return found
+
+
+def controllers(
+    mapping: ImportMap, table: DataTable, data: Path, theirs: Array, rows: Any
+) -> ControllerClock | None:
+    """The clock of the controller by times (rows,) of the data, s; None where nothing tells it."""
+    interval = mapping.plan.test.interval
+    by_ground = None
+    if (ground := recorded_ground(mapping, table, data, rows)) is not None:
+        planned = planned_ground(mapping.plan, float(theirs[-1]))
+        by_ground = None if planned is None else clock_by_ground(theirs, ground, planned, interval)
+    found = clock_of(theirs, columns_of(mapping, table, data, rows), interval)
+    return found.beside(by_ground) if found and by_ground else found or by_ground
+
+
+def recorded_ground(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> Array | None:
+    """The ground acceleration (rows,) as a logger recorded a number of the controller, m/s²; None for any other."""
+    name = "ground_acceleration"
+    source = mapping.signals.get(name)
+    if source is None or source.value is not None or source.filter is not None or source.delay != 0.0:
+        return None
+    scale, _ = scale_of(name, source, lab_signals(mapping.plan)[name][1], table, data)
+    found: Array = scale * pick(table, source.column, data)[rows] + source.offset
+    return found if np.isfinite(found).all() else None
+
+
+def planned_ground(plan: Plan, seconds: float) -> Array | None:
+    """The plan's ground acceleration at the ticks of a test, m/s²; None where it cannot be read."""
+    from loop import substructure
+
+    try:
+        found = substructure.recorded_ground(with_test(plan, duration=seconds + 4.0 * plan.test.interval))
+    except InputError:
+        return None
+    return None if found is None else found[1][0]
+
+
+def of_controller(plan: Plan) -> set[str]:
+    """The signals that a controller computes, numbers and times of messages apart."""
+    from laboratories import kinds
+
+    there = [kinds.own(plan), *(kinds.kind_of(plan, role) for role in plan.roles)]
+    read = {row.name for kind in there if kind for row in kind.channels.measured}
+    return {
+        name
+        for name, (topic, row) in lab_signals(plan).items()
+        if row.name not in read and row.kind is not FieldType.INDEX and topic in (MASTER, *plan.roles)
+    }
+
+
+def columns_of(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> list[Array]:
+    """The columns (rows,) of the data that are signals and have a number in every row."""
+    columns = [
+        pick(table, source.column, data)[rows] for source in mapping.signals.values() if source.value is None
+    ]
+    return [one for one in columns if np.isfinite(one).all()]
 
 
 def rate_of(times: Array) -> float:
@@ -159,26 +243,6 @@ def nearest_rows(theirs: Array, t: Array) -> npt.NDArray[np.intp]:
     after = np.clip(np.searchsorted(theirs, t), min(1, theirs.size - 1), theirs.size - 1)
     before = np.maximum(after - 1, 0)
     return np.where(np.abs(theirs[after] - t) < np.abs(theirs[before] - t), after, before)
-
-
-def held(times: Array, values: Array, t: Array, interval: float) -> Array | None:
-    """What a channel holds from each tick `t` on for an interval (s); None for one that is no staircase.
-
-    What a controller computes tick by tick is one where the logger is faster. A curve through such steps would be wrong
-    between them. Where in an interval the steps come, by the clock of the logger, is told by all of them.
-    """
-    per = int(interval / float(np.median(np.diff(times))) + ON_TICKS) if times.size > 1 else 0
-    changes = np.flatnonzero(np.diff(values))
-    if per < ROWS_HELD or changes.size < CHANGING * (times[-1] - times[0]) / interval:
-        return None
-    if np.mean(np.diff(changes) < per) >= TOO_SOON:
-        return None
-    steps = 0.5 * (times[changes] + times[changes + 1]) / interval
-    about = float(np.angle(np.mean(np.exp(2j * np.pi * steps)))) / (2.0 * np.pi)
-    away = (steps - about + 0.5) % 1.0 - 0.5
-    rate, first = np.polyfit(steps, away, 1)  # its clock is fast or slow against that of the controller
-    ticks = t / interval
-    return values[nearest_rows(times, interval * (ticks + about + first + rate * ticks + 0.5))]
 
 
 def moved(theirs: Array, values: Array, t: Array, row: Signal) -> Array:

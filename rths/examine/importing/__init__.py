@@ -1,0 +1,1 @@
+"""Data of another logger as signals of a recording: the map of its columns, and their rows on the ticks."""

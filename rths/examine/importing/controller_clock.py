@@ -1,0 +1,259 @@
+"""The ticks of a controller by the clock of a data logger, from what the controller holds from tick to tick.
+
+Where the logger recorded the ground acceleration as a number, the plan's own says at which tick each row was taken: no
+sooner than that tick, and before the next one. Without it a logger that is faster than the controller still records
+each value once or several times. Where a value is new, a tick lies between its row and the one before, and no tick lies
+between rows of one value. Such bounds say when the ticks are by the logger's clock: the closer, the more the two clocks
+are out of step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from models.registry import Array
+
+LEAST_RUNS = 40  # of rows of one value, from which on they may be those of a controller
+CHANGING = 0.5  # share of the ticks at which such a channel changes at least
+BLOCK = 100  # ticks, in which a clock gains little
+# Share of the bounds in a block that may be missed: times are rounded when printed, and a controller is late at times.
+MISSED = 0.05
+ROUNDED = 0.03  # of an interval, by which the others may be missed
+ON_TICK = 0.01  # of an interval, within which the first row is on its tick
+TOWARDS = 0.1  # of an interval
+STEADY = 0.2  # share of the usual width of bounds that all of them have in common, of a clock that is in step
+# Of clocks: what a quartz errs by at most as a rule, what any errs by, and between rates that are tried.
+QUARTZ, FASTEST, STEP = 6e-5, 1e-3, 5e-7
+OTHER = 0.01  # share of neighbours within one interval that may differ in a channel that holds
+OFTEN = 0.5  # share of them from which on those whose rows are not on a tick decide
+# Of the ground: ticks around a row at which it may have been taken, distance to one over that to all others below which
+# it was, and share of the motion's rms by which these must differ.
+AROUND, SAME, APART = 2, 0.02, 1e-3
+NEARBY, TRIED = (5e-2, 1e-3, 2e-5), 101  # of an interval, closer and closer, and beginnings within it
+ONE_LESS = 2  # the bound but one of a block counts: a time may be printed badly
+
+
+class ControllerClock(NamedTuple):
+    """When a controller's ticks are by the clock of a logger."""
+
+    interval: float  # s, of the controller
+    begin: float  # s, of its first tick, from the first row on
+    fast: float  # by how much the logger's clock is fast
+
+    @property
+    def between(self) -> bool:
+        """Whether its ticks lie between rows, or drift past them."""
+        return self.begin != 0.0 or self.fast != 0.0
+
+    @property
+    def told(self) -> str:
+        """A sentence for the user."""
+        side = "before" if self.begin < 0.0 else "after"
+        place = f"{1e3 * abs(self.begin):.2g} ms {side} the first row" if self.begin else "at the first row"
+        rate = f", and the data's clock is {'fast' if self.fast > 0.0 else 'slow'} by {1e6 * abs(self.fast):.2g} ppm"
+        return (
+            f"clock: what the controller holds shows that its first tick is {place}{rate if self.fast else ''}; all "
+            "channels were put onto its ticks"
+        )
+
+    def ticks(self, t: Array) -> Array:
+        """Times (ticks,) by the logger, s, of ticks at times `t` of the controller."""
+        return self.begin + (1.0 + self.fast) * t
+
+    def holds(self, times: Array, values: Array) -> bool:
+        """Whether values (n,) at times (n,) of the logger, s, change from tick to tick and not between."""
+        place = self.places(times)
+        between = np.abs(place - np.round(place)) > ROUNDED
+        together = np.floor(place[1:] + ROUNDED) == np.floor(place[:-1] + ROUNDED)
+        sure = together & between[1:] & between[:-1]
+        if np.count_nonzero(sure) > OFTEN * np.count_nonzero(together):
+            together = sure  # where rows are on ticks by chance only, these may show either value
+        differ = np.diff(values) != 0.0
+        if not together.any() or np.count_nonzero(differ) < CHANGING * (place[-1] - place[0]):
+            return False
+        return bool(np.mean(differ[together]) < OTHER)
+
+    def held(self, times: Array, values: Array, t: Array) -> Array:
+        """What a channel that holds, (n,) at times (n,) of the logger, s, has from each tick at `t` on.
+
+        It is the row nearest to the middle of an interval, so that each tick must have a row.
+        """
+        middle = self.ticks(t) + 0.5 * self.interval
+        after = np.clip(np.searchsorted(times, middle), 1, times.size - 1)
+        before = after - 1
+        return values[np.where(middle - times[before] < times[after] - middle, before, after)]
+
+    def seen(self, times: Array, values: Array) -> tuple[Array, Array]:
+        """The ticks (m,), s by the controller, whose values (m,) were in force at times (n,) of the logger, s."""
+        on_tick = 0.0 if self.between else ON_TICK
+        ticks, rows = np.unique(np.floor(self.places(times) + on_tick), return_index=True)
+        return self.interval * ticks, values[rows]
+
+    def latest(self, times: Array, values: Array, t: Array) -> Array:
+        """What was recorded last, of values (n,) at times (n,) of the logger, s, before the tick after each at `t`."""
+        following = self.ticks(t) + (1.0 - ON_TICK) * self.interval
+        return values[np.clip(np.searchsorted(times, following) - 1, 0, None)]
+
+    def beside(self, other: ControllerClock) -> ControllerClock:
+        """The same clock with that tick as the first one which it is by the other."""
+        turns = round((other.begin - self.begin) / self.interval)
+        return self._replace(begin=self.begin + turns * self.interval)
+
+    def places(self, times: Array) -> Array:
+        """Times (n,) of the logger, s, in ticks of the controller."""
+        return (times - self.begin) / ((1.0 + self.fast) * self.interval)
+
+
+def clock_of(times: Array, channels: Iterable[Array], interval: float) -> ControllerClock | None:
+    """The clock that the channels (n,) at times (n,) of a logger, s, tell; None where none of them holds its values.
+
+    A clock that may be in step is taken to be so: bounds then say no more than between which rows the ticks are.
+    """
+    ratio = float(np.median(np.diff(times))) / interval if times.size > 1 else 1.0
+    if ratio > 1.0 - ROUNDED:
+        return None
+    for values in sorted(channels, key=lambda one: -np.count_nonzero(np.diff(one))):
+        found = told(times, values, interval)
+        if found is not None and found.holds(times, values):
+            return found
+    return None
+
+
+def clock_by_ground(times: Array, values: Array, ground: Array, interval: float) -> ControllerClock | None:
+    """The clock by recorded ground acceleration (n,) at times (n,) of a logger, s, and the plan's (ticks,).
+
+    None where what was recorded is no number of the controller, held from tick to tick.
+    """
+    usual = np.floor(times / interval + ON_TICK).astype(int)
+    near = usual[:, None] + np.arange(-AROUND, AROUND + 1)
+    away = np.abs(ground[np.clip(near, 0, ground.size - 1)] - values[:, None])
+    best = np.argmin(away, axis=1)
+    nearest, other = np.partition(away, 1, axis=1)[:, :2].T
+    clear = (other > APART * float(np.sqrt(np.mean(np.square(ground))))) & (near[:, 0] >= 0)
+    same = clear & (nearest < SAME * other)
+    if np.count_nonzero(same) < max(LEAST_RUNS, (1.0 - MISSED) * np.count_nonzero(clear)):
+        return None
+    high = (times - interval * near[np.arange(best.size), best])[same]
+    block, when = (usual[same] // BLOCK).astype(int), times[same]
+    rows = [
+        (
+            float(np.mean(when[own])),
+            float(np.sort(high[own])[-ONE_LESS]) - interval,
+            float(np.sort(high[own])[ONE_LESS - 1]),
+        )
+        for own in (block == one for one in np.unique(block))
+        if np.count_nonzero(own) > 1.0 / MISSED
+    ]
+    agreed = [row for row in rows if row[1] <= row[2] + 2.0 * ROUNDED * interval]
+    if len(agreed) <= CHANGING * len(rows):
+        return None
+    middle, least, most = np.array(agreed).T
+    found = within(middle, least, most, interval, turning=False)
+    return refined(found, when, near[np.arange(best.size), best][same]) if found and found.between else found
+
+
+def refined(clock: ControllerClock, times: Array, ticks: npt.NDArray[np.int_]) -> ControllerClock:
+    """The clock that begins so that most rows at times (n,), s, lie behind the ticks (n,) at which they were taken."""
+    for share in NEARBY:
+        nearby = clock.begin + share * clock.interval * np.linspace(-1.0, 1.0, TRIED)
+        fit = [np.count_nonzero(np.floor(clock._replace(begin=one).places(times)) == ticks) for one in nearby]
+        best = np.flatnonzero(np.array(fit) == max(fit))
+        clock = clock._replace(begin=float(np.mean(nearby[best])))
+    return clock
+
+
+def told(times: Array, values: Array, interval: float) -> ControllerClock | None:
+    """The clock by the bounds of one channel (n,); None where they contradict each other."""
+    low, high = bounds(times, values, interval)
+    if low.size < LEAST_RUNS:
+        return None
+    block = np.floor(0.5 * (low + high) / (BLOCK * interval)).astype(int)
+    rows = [
+        limits(low[block == one], high[block == one], interval)
+        for one in np.unique(block)
+        if np.count_nonzero(block == one) > 1.0 / MISSED
+    ]
+    # in the block where the ticks pass a row of a clock that is out of step, one half contradicts the other
+    agreed = [row for row in rows if row[1] <= row[2] + 2.0 * ROUNDED * interval]
+    if len(agreed) <= CHANGING * len(rows):
+        return None
+    middle, least, most = np.array(agreed).T
+    shift = interval * turns(0.5 * (least + most) / interval)
+    return within(middle, least + shift, most + shift, interval)
+
+
+def bounds(times: Array, values: Array, interval: float) -> tuple[Array, Array]:
+    """Times (runs,), s, between which there is a tick, by each run of rows that have one value for no longer than that.
+
+    A run from row a to row b begins with a tick between rows a−1 and a, and the next one is between rows b and b+1.
+    """
+    new = np.flatnonzero(np.diff(values)) + 1
+    first, last = new[:-1], new[1:] - 1
+    low = np.maximum(times[first - 1], times[last] - interval)
+    high = np.minimum(times[first], times[last + 1] - interval)
+    kept: npt.NDArray[np.bool_] = high > low
+    return low[kept], high[kept]
+
+
+def limits(low: Array, high: Array, interval: float) -> tuple[float, float, float]:
+    """The middle of a block of bounds (runs,), s, and between which times after a multiple of an interval they agree.
+
+    Few of them may be missed.
+    """
+    middle = 0.5 * (low + high)
+    narrow = 1.0 / (high - low)
+    turned = np.sum(narrow * np.exp(2j * np.pi * middle / interval))
+    about = float(np.angle(turned)) / (2.0 * np.pi) * interval
+    off = (middle - about + 0.5 * interval) % interval - 0.5 * interval
+    half = 0.5 * (high - low)
+    least, most = np.quantile(off - half, 1.0 - MISSED), np.quantile(off + half, MISSED)
+    return float(np.mean(middle)), about + float(least), about + float(most)
+
+
+def turns(centre: Array) -> Array:
+    """Whole intervals (blocks,) that join limits about `centre` (blocks,), in intervals, to a steady course.
+
+    Where one may go on either side by as much, it goes to where ticks are nearer to the first row.
+    """
+    result = np.zeros(centre.size)
+    last = float(centre[0])
+    for place, here in enumerate(centre):
+        result[place] = round(last - math.copysign(TOWARDS, last) - here)
+        last = float(here + result[place])
+    return result
+
+
+def within(
+    middle: Array, least: Array, most: Array, interval: float, *, turning: bool = True
+) -> ControllerClock | None:
+    """The clock within limits (blocks,) about times (blocks,), s; None where none is.
+
+    Limits that are `turning` hold for any tick, and the first one is the one nearest to the first row.
+
+    It is in step, or begins with a tick, where that is within them as well: many loggers do by design.
+    """
+    rates = STEP * np.arange(-round(FASTEST / STEP), round(FASTEST / STEP) + 1)
+    low = np.max(least - rates[:, None] * middle, axis=1) - ROUNDED * interval
+    high = np.min(most - rates[:, None] * middle, axis=1) + ROUNDED * interval
+    allowed = low <= high
+    usual = allowed & (np.abs(rates) <= QUARTZ)
+    places = np.flatnonzero(usual if usual.any() else allowed)
+    if not places.size:
+        return None
+    in_step = rates.size // 2
+    width = high[in_step] - low[in_step] - 2.0 * ROUNDED * interval
+    steady = (
+        width > -ON_TICK * interval and width > STEADY * float(np.median(most - least)) - ON_TICK * interval
+    )
+    place = in_step if steady else int(places[[0, -1]].mean())
+    begin, half = 0.5 * (low[place] + high[place]), 0.5 * (high[place] - low[place])
+    if turning:
+        begin -= interval * round(begin / interval)
+    known, near = half - ROUNDED * interval, ON_TICK * interval
+    on_tick = abs(begin) <= known + near and (known < near or begin - known < -near)
+    return ControllerClock(interval, 0.0 if on_tick else float(begin), float(rates[place]))
