@@ -21,7 +21,6 @@ from diagnosis.signals import colour
 from diagnosis.signals.noise_model import NoiseModel
 
 OF_LINE = 3  # parameters of a narrow line: frequency, amplitude and phase
-BEYOND = 10.0  # of −2·log, from which on evidence is called very strong (Kass and Raftery, 1995)
 
 
 def surprise(fit: Fit) -> float:

@@ -21,6 +21,7 @@ from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import MATERIAL, exceeds, gaps, leaves, model_error
 from diagnosis.fits.worth import changes, idle, is_gap
 from diagnosis.signals.mask import Mask
+from diagnosis.signals.strength import BEYOND
 from models.registry import Array
 
 ROUNDS = 4  # in which a fit and the noise that it leaves are found in turn
@@ -251,4 +252,4 @@ def remodelled(fit: Fit) -> Fit:
 
 def far_likelier(fit: Fit, bare: Fit) -> bool:
     """Whether the data are far more probable under a fit and its noise than under the one without effects."""
-    return evidence.surprise(fit) < evidence.surprise(bare) - evidence.BEYOND
+    return evidence.surprise(fit) < evidence.surprise(bare) - BEYOND

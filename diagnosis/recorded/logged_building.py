@@ -10,9 +10,10 @@ import numpy as np
 
 from diagnosis.recorded.nuisances import ALIKE, CALIBRATED, LATE, UNLIKE, LoggedForce
 from diagnosis.recorded.parts import Building
-from diagnosis.recorded.record import Delay
-from diagnosis.signals import alike
+from diagnosis.recorded.record import LEAST_TICKS, Delay
+from diagnosis.signals import alike, low_pass
 from diagnosis.signals.earlier import earlier
+from diagnosis.signals.strength import BEYOND
 from loop.nominal import partition
 from models.registry import Array
 from models.structures import shear_building
@@ -60,6 +61,7 @@ class LoggedBuilding(Building):
     Where what was recorded lies `behind` stated filters and delays, motion, ground and every force also pass those of
     the others: the balance of a linear building holds behind a filter as it does before it, and no filter is undone.
     A delay beyond those stated is then one of the forces that the logger filtered: others are the master's own numbers.
+    So are they where the balance is far likelier if the own laboratory's force `alone` came through the logger.
     """
 
     exact = False
@@ -78,6 +80,23 @@ class LoggedBuilding(Building):
         rows = (("delay", late, self.about), ("gain", self._stated.calibration or CALIBRATED, 0.0))
         logger = tuple(LoggedForce(name, by, None, self._force, at) for name, by, at in rows if self._force)
         self.nuisances = (*of.nuisances, *logger)
+        self.alone = False
+        whole = bool(of.present.all()) and len(self.measured) >= LEAST_TICKS
+        if of.linear and not behind and whole and len(self.sources) > 1:
+            self.alone = self.delayed_alone()
+
+    def delayed_alone(self) -> bool:
+        """Whether what was recorded of the other forces is what the master used, and only the own one is delayed."""
+        own, every = (self.demanded(used=used) for used in (False, True))
+        if low_pass.likelier_whole(every, own) >= BEYOND:
+            return False
+        alone, together = (low_pass.roughly(one) for one in (own, every))
+        return alone.gain > BEYOND and alone.surprise < together.surprise - BEYOND
+
+    def demanded(self, *, used: bool) -> low_pass.ReadSpectra:
+        """Spectra of the forces recorded and of those that the motion demands; as `forces_demanded` has them."""
+        rows = self.forces_demanded(used=used)
+        return low_pass.spectra(*rows, self._interval, 0.5 / self._interval, noisy=True)
 
     def pass_alike(self) -> None:
         """Bring motion, ground and forces behind the same filters, each as late as the own laboratory's force."""
@@ -144,8 +163,10 @@ class LoggedBuilding(Building):
         delay, gain = self.logger(system)
         rows = np.column_stack([force, used])
         late = [not self.behind or one.filter is not None for one in self.channels[-rows.shape[1] :]]
+        if self.alone:
+            late[1:] = [False] * len(late[1:])
         rows[:, late] = earlier(rows[:, late], delay / self._interval)
-        return position, rows[:, 0] / gain, rows[:, 1:] / gain
+        return position, rows[:, 0] / gain, rows[:, 1:] / (1.0 if self.alone else gain)
 
     def logger(self, system: System) -> tuple[float, float]:
         """Delay (s) and gain of the logger in a hypothesis."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -84,6 +84,11 @@ def spectra(
 def surprise(of: ReadSpectra, channel: ImportedChannel) -> float:
     """−2·log of how probable the readings are behind a filter or delay, at the best parameters, up to a constant."""
     return weighed(of, behind(of, channel))
+
+
+def surprises(of: Sequence[ReadSpectra], channel: ImportedChannel) -> float:
+    """The same of several readings that passed one filter or delay."""
+    return sum(surprise(one, channel) for one in of)
 
 
 def surprise_unknown(of: ReadSpectra) -> float:
@@ -189,14 +194,14 @@ class Said(NamedTuple):
     gain: float  # by how much less surprising they are behind it than with nothing
 
 
-def roughly(of: ReadSpectra) -> Said:
-    """The likeliest filter of a usual order, or delay alone."""
-    tried = {late: min(surprise(of, one(late)) for one in ROUGH) for late in LATES}
+def roughly(*of: ReadSpectra) -> Said:
+    """The likeliest filter of a usual order, or delay alone, that readings passed."""
+    tried = {late: min(surprises(of, one(late)) for one in ROUGH) for late in LATES}
     late = min(tried, key=lambda late: tried[late])
-    return Said(late, tried[late], surprise(of, NOTHING_STATED) - tried[late])
+    return Said(late, tried[late], surprises(of, NOTHING_STATED) - tried[late])
 
 
-def likeliest(of: ReadSpectra, late: float, beyond: float) -> ImportedChannel:
+def likeliest(late: float, beyond: float, *of: ReadSpectra) -> ImportedChannel:
     """The filter behind which readings are least surprising, of those that delay by about `late` s.
 
     It is a delay alone where none makes them less surprising by more than `beyond`.
@@ -204,7 +209,7 @@ def likeliest(of: ReadSpectra, late: float, beyond: float) -> ImportedChannel:
     place = LATES.index(late)
     low, high = LATES[max(0, place - 1)], LATES[min(place + 1, len(LATES) - 1)]
     alone, *filters = (
-        closest(partial(surprise, of), one, low, high)
+        closest(partial(surprises, of), one, low, high)
         for one in (shape("", 0), *itertools.starmap(shape, SHAPES))
     )
     best = min(filters, key=lambda item: item[1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import NamedTuple, cast
@@ -15,12 +16,12 @@ from common.roles import MASTER
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged import filters, logger
 from diagnosis.fits import fitting, residuals, settling, worth
-from diagnosis.fits.evidence import BEYOND
 from diagnosis.recorded import logged_building
 from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import NOT_LATE, Record
 from diagnosis.signals import low_pass
+from diagnosis.signals.strength import BEYOND
 from models.registry import Array
 from tests.diagnosis.cases import STRONGEST, Cases, imported, lab_a, lab_b, white
 
@@ -115,6 +116,12 @@ def surprise(of: Wanted, channel: ImportedChannel) -> float:
     return of.sure * (channel.late / LATE / of.late - 1.0) ** 2
 
 
+def together(of: Sequence[Wanted]) -> float:
+    """The delay, s, that all of them find least surprising."""
+    weights = [max(one.sure, 1e-9) / one.late for one in of]
+    return LATE * sum(weights) / sum(weight / one.late for weight, one in zip(weights, of, strict=True))
+
+
 def readings(*wanted: Wanted) -> list[filters.AlikeReadings]:
     """Those of laboratories, one each."""
     return [filters.AlikeReadings("", (), cast(low_pass.ReadSpectra, one)) for one in wanted]
@@ -125,8 +132,8 @@ def weighed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Likelihoods of what is wanted in place of those of spectra."""
     stands = SimpleNamespace(
         surprise=surprise,
-        roughly=lambda of: low_pass.Said(of.late * LATE, 0.0, of.sure),
-        likeliest=lambda of, *_: ImportedChannel(delay=of.late * LATE),
+        roughly=lambda *of: low_pass.Said(together(of), 0.0, sum(one.sure for one in of)),
+        likeliest=lambda late, beyond, *of: ImportedChannel(delay=together(of)),
         missed=lambda of, _: of.missed,
         surprise_unknown=lambda _: np.inf,
     )
@@ -142,6 +149,17 @@ def test_readings_together_decide_on_one_delay(sure: float, said: float) -> None
     theirs = filters.Common(ImportedChannel(delay=LATE), (others,))
     found = filters.alike(own, theirs)
     assert [one.channel.delay for one in found] == pytest.approx([said * LATE] * 2)
+
+
+@pytest.mark.usefixtures("weighed")
+@pytest.mark.parametrize(("other", "agreed"), [(1.04, True), (1.4, False)])
+def test_one_delay_of_all_is_taken_where_none_loses_by_it(other: float, agreed: bool) -> None:
+    one, two = readings(Wanted(1.0, 2000.0), Wanted(other, 2000.0))
+    found = filters.of_all([one._replace(role="master"), two._replace(role="slave")])
+    assert (found is not None) == agreed
+    if found is not None:
+        assert LATE < found.delay < other * LATE
+    assert filters.of_all([one, two]) is None  # of one laboratory that follows from its fault as well
 
 
 @pytest.mark.usefixtures("weighed")

@@ -34,7 +34,7 @@ from diagnosis.report.records import HowFar
 from diagnosis.signals import alike
 from diagnosis.signals.earlier import earlier
 from models.registry import Array
-from tests.diagnosis.cases import Cases, lab_a, white
+from tests.diagnosis.cases import STRONGEST, Cases, lab_a, white
 
 LEVEL = 200.0  # N
 LATE = 2  # ticks
@@ -292,6 +292,26 @@ def test_a_stated_filter_of_its_force_is_no_gap_of_the_building(cases: Cases, na
     bare = settling.settled(fitting.fit(view, {}))
     assert not worth.is_gap(bare)
     assert np.max(np.abs(bare.z)) < 1.0
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_numbers_that_came_from_the_slave_are_not_late_with_the_force_that_a_logger_read(
+    cases: Cases, alone: bool
+) -> None:
+    whole = cases.record(duration=STRONGEST)
+    late = {
+        name: np.concatenate([np.full(LATE, values[0]), values[:-LATE]])
+        for name, values in whole.signals.items()
+        if name == "column_force" or (name == "damper_force_used" and not alone)
+    }
+    view = logged(replace(whole, signals=whole.signals | late))
+    part = cast(LoggedBuilding, view.part)
+    assert part.alone == alone
+    bare = settling.settled(fitting.fit(view, {}))
+    assert np.max(np.abs(bare.z[:3])) < 1.0
+    delay = part.late(bare.z, np.zeros(bare.z.size))
+    assert delay is not None
+    assert delay.about == pytest.approx(LATE * whole.plan.test.interval, abs=2e-4)
 
 
 def test_a_fault_of_the_building_has_its_size_behind_a_stated_filter(cases: Cases) -> None:

@@ -7,6 +7,7 @@ laboratories pass it alike, or where the force that the master used did not pass
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,7 +17,6 @@ import numpy as np
 
 from common.recording.imported import NOTHING_STATED, ImportedChannel, LoggerFilter
 from common.roles import MASTER
-from diagnosis.fits.evidence import BEYOND
 from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.nuisances import ALIKE
@@ -25,6 +25,7 @@ from diagnosis.recorded.record import LEAST_TICKS, Delay, Late, Record
 from diagnosis.signals import low_pass
 from diagnosis.signals.low_pass import ReadSpectra
 from diagnosis.signals.mask import Mask
+from diagnosis.signals.strength import BEYOND
 
 # Share of a reading's rms that a nominal model leaves, from which on an effect is at work: noise, a hum of 1 % of the
 # peak and a converter together leave up to 4 %.
@@ -86,14 +87,32 @@ def filtered(record: Record) -> Record:
     record = in_time(record)
     parts, labs = parts_of(record), unstated(record)
     reading_forces, reading_others = (of_laboratories(record, labs, force=force) for force in (True, False))
-    forces, others = (
-        of_forces(reading_forces, of_building(record, parts)),
-        in_common(reading_others, likely(reading_others)),
-    )
-    forces, others = followed(others, forces, reading_forces), followed(forces, others, reading_others)
-    forces, others = alike(forces, others)
+    whole = of_all([*reading_forces, *reading_others])
+    if whole is not None:
+        forces, others = (Common(whole, tuple(labs)) for labs in (reading_forces, reading_others))
+    else:
+        forces, others = (
+            of_forces(reading_forces, of_building(record, parts)),
+            in_common(reading_others, likely(reading_others)),
+        )
+        forces, others = followed(others, forces, reading_forces), followed(forces, others, reading_others)
+        forces, others = alike(forces, others)
     late = Late(Delay(forces.channel.delay), Delay(others.channel.delay))
     return replace(record, passed=by_channel(forces, others), late=late)
+
+
+def of_all(labs: Sequence[AlikeReadings]) -> ImportedChannel | None:
+    """The one filter or delay that all readings passed, by what all of them say together.
+
+    None where one of them knows of another one for itself: an effect may be at work there.
+    """
+    spectra = [one.spectra for one in labs]
+    if len({one.role for one in labs}) < 2 or (rough := low_pass.roughly(*spectra)).gain < BEYOND:
+        return None
+    whole = low_pass.likeliest(rough.late, BEYOND, *spectra)
+    lost = [item.of.gain(item.channel) - item.of.gain(whole) for item in likely(labs)]
+    agreed = all(one.gain(whole) > -BEYOND for one in labs) and max(lost, default=math.inf) < EACH * BEYOND
+    return whole if agreed else None
 
 
 def unstated(record: Record) -> list[LaboratoryPart]:
@@ -152,7 +171,7 @@ def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> 
     first, own = min(tried, key=lambda item: item[0].surprise, default=(None, None))
     if first is None or own is None or first.gain < BEYOND:
         return agreed
-    channel = low_pass.likeliest(own.spectra, first.late, BEYOND)
+    channel = low_pass.likeliest(first.late, BEYOND, own.spectra)
     said = low_pass.surprise(own.spectra, channel)
     if low_pass.missed(own.spectra, channel) > SPOILT or low_pass.surprise_unknown(own.spectra) < said:
         return agreed  # something is at work in the building
@@ -210,7 +229,7 @@ def likely(labs: Sequence[AlikeReadings]) -> list[LikelyFilter]:
     """The filter or delay of each laboratory whose readings are far likelier behind one."""
     said = [(low_pass.roughly(one.spectra), one) for one in labs]
     return [
-        LikelyFilter(low_pass.likeliest(one.spectra, item.late, BEYOND), item.gain, one)
+        LikelyFilter(low_pass.likeliest(item.late, BEYOND, one.spectra), item.gain, one)
         for item, one in said
         if item.gain > BEYOND
     ]
@@ -318,11 +337,7 @@ def of_building(record: Record, parts: Sequence[Part]) -> list[AlikeReadings]:
         return []
     if found.treated or record.gapped:
         return []
-    interval, view = record.plan.test.interval, LoggedBuilding(found)
-    own, every = (
-        low_pass.spectra(*view.forces_demanded(used=used), interval, 0.5 / interval, noisy=True)
-        for used in (False, True)
-    )
+    own, every = (LoggedBuilding(found).demanded(used=used) for used in (False, True))
     alone = AlikeReadings(MASTER, found.sources[:1], own)
     used_others = low_pass.likelier_whole(every, own) < BEYOND
     return [*([alone] if used_others else []), AlikeReadings(MASTER, found.sources, every)]
