@@ -22,6 +22,7 @@ from diagnosis.fits.trade import tied
 from diagnosis.fits.unexplained import foresees, gaps, leaves, model_error
 from diagnosis.fits.worth import SEEN, at_bound
 from diagnosis.recorded.nuisances import LoggedReadings
+from diagnosis.recorded.parts import MODEL_ERROR
 from diagnosis.report.records import Outcome
 from laboratories.effects.sites import is_sensor
 from models.registry import Array
@@ -189,13 +190,16 @@ def artefact(search: Search) -> bool:
 
 
 def trifling(search: Search) -> bool:
-    """Whether nothing but gains of readings is named, smaller than what their machine is known to.
+    """Whether nothing but gains is named, smaller than what their machine is known to.
 
     That a reading is too large by less than the tolerances of the machine's parameters follows only if the machine's
     model is exact beyond them: a parameter that is no constant, within its tolerance, changes the reading as much. The
-    machine must change the same readings.
+    machine must change the same readings. No factor at all is known to less than two good solutions differ by.
     """
     data, fit = search.data, search.chosen
+    factors = [values["factor"] for values in fit.values.values() if set(values) == {"factor"}]
+    if len(factors) == len(fit.names) and all(abs(one - 1.0) < MODEL_ERROR for one in factors):
+        return True
     known = min((item.tolerance for item in data.part.nuisances if not item.of_record), default=0.0)
     effects = [data.catalogue[name] for name in fit.names]
     gains = [abs(fit.values[item.name]["factor"] - 1.0) for item in effects if item.fault == "gain"]

@@ -17,7 +17,7 @@ from diagnosis.findings.certainty.trust import less_by_freedom, of_the_plan, sha
 from diagnosis.findings.report import status_of
 from diagnosis.findings.sensors.own_reading import machine_alone
 from diagnosis.findings.sensors.slow_noise import lone_noise
-from diagnosis.findings.verdict import PartVerdict, allowed, artefact, judge
+from diagnosis.findings.verdict import PartVerdict, allowed, artefact, judge, trifling
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
 from diagnosis.fits.fitting import Fit, at_end, without_rest
 from diagnosis.fits.hypothesis import TOLERANCES, Values
@@ -123,6 +123,12 @@ def test_errors_of_readings_that_leave_a_tenth_of_a_gap_are_not_its_cause() -> N
     assert artefact(search(5.0))
     assert not artefact(search(1.0))
     assert not artefact(search(5.0, "column.friction"))
+
+
+@pytest.mark.parametrize(("factor", "named"), [(1.0003, False), (1.003, True)])
+def test_a_factor_that_is_less_than_solutions_differ_by_is_no_cause(factor: float, named: bool) -> None:
+    chosen = Fit(DATA, {"table.gain": {"factor": factor}}, np.zeros(0), NOISY)
+    assert trifling(Search(DATA, fit(NOISY + 10.0 * GAP), chosen, ())) != named
 
 
 @pytest.mark.parametrize(("factor", "outcome"), [(1.005, "unknown"), (1.05, "explained")])
