@@ -74,10 +74,9 @@ def at_any_size(data: Data, scales: Scales) -> tuple[Search, Fit | None]:
     """
     bare = settling.settled(fitting.fit(data, {}))
     found = found_from(data, bare, scales)
-    filtered = bool(np.isfinite(data.part.passes).any())
     if (
         data.part.exact
-        or filtered
+        or data.fine is data
         or leaves(found.chosen, model_error(found.chosen))
         or found_enough(found, bare)
     ):

@@ -40,6 +40,7 @@ class JoinedPart:
         first = self.pieces[0]
         self.name, self.role, self.signals = first.name, first.role, first.signals
         self.nuisances, self.candidates, self.exact = first.nuisances, first.candidates, first.exact
+        self.retimed = any(piece.retimed for piece in self.pieces)
         self.measured = np.concatenate([piece.measured for piece in self.pieces])
         self.present = np.concatenate([piece.present for piece in self.pieces])
 

@@ -103,7 +103,7 @@ class LoggedReadings(Nuisance):
     """Delay (s), about the one found elsewhere, or gain with which a logger recorded readings of a laboratory.
 
     A logger whose filter is stated may delay by less than that filter; one of which nothing is stated records nothing
-    early.
+    earlier than `least`.
     """
 
     of_record = True
@@ -200,7 +200,8 @@ def of_logger(
     """Delays of force readings and of the others by a logger of which nothing is stated, about those found elsewhere.
 
     `spread` is their standard deviation, s; None for what is usual. `held` is the longest that a command may be held
-    between rows, s.
+    between rows, s; 0 where a controller holds it from tick to tick, after which a logger may read up to an interval
+    later, so that its readings are early.
     """
     rows, groups = lab.kind.channels.measured, ((late.force, True), (late.motion, False))
     return tuple(
@@ -210,6 +211,7 @@ def of_logger(
             lab,
             those,
             about,
+            0.0 if held else -min(lab.plan.test.interval, HELD),
         )
         for (about, unsure), force in groups
         if (those := tuple(row.name for row in rows if (row.unit == "N") == force))

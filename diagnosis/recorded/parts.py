@@ -18,6 +18,7 @@ from common.recording.imported import ImportedData
 from common.roles import MASTER
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import (
+    BETWEEN,
     CALIBRATED,
     LoggedReadings,
     Nuisance,
@@ -66,6 +67,7 @@ class Part(Protocol):
     measured: Array  # (ticks, signals)
     present: Mask  # (ticks, signals)
     exact: bool  # computed, not measured: free of noise
+    retimed: bool  # whether readings were moved in time, by what is known of a logger to some ten µs only
 
     @property
     def level(self) -> Array:
@@ -123,6 +125,7 @@ class Measured:
     """What parts have in common whose readings stand for themselves."""
 
     measured: Array
+    retimed = False
 
     @property
     def level(self) -> Array:
@@ -154,6 +157,7 @@ class LaboratoryPart:
         seen = [machine for machine in machines if self.shows(record, machine)]
         names = tuple(name for machine in seen for name in machine.parameters)
         self.channels = channels(record.stated, lab)
+        self.retimed = record.retimed or any(channel.interpolated for channel in self.channels)
         self.free = nothing_stated(record.mapped, lab)
         self.built_in = lab.kind.name in KINDS  # a user's kind has steps of its own within an interval
         self.steps = 0 if held(lab) else record.steps if self.built_in else min(record.steps, 1)
@@ -310,11 +314,12 @@ class LaboratoryPart:
         deviation of their delays, s. A stated delay or calibration stays; a stated filter's delay is known to a tenth.
         """
         lab, held = self.lab, self._interval if self.steps else 0.0
+        retimed = self.retimed or max(late.force.about, late.motion.about) > BETWEEN
         delays = of_logger(lab, late, spread, held) if self.free else of_filters(lab, self.channels, held)
         if any(channel.calibration > 0.0 for channel in self.channels):
-            return self.replaced(nuisances=(*self.nuisances, *delays))
+            return self.replaced(nuisances=(*self.nuisances, *delays), retimed=retimed)
         gain = LoggedReadings("gain", CALIBRATED, self.lab, self.lab.kind.channels.names)
-        return self.replaced(nuisances=(*self.nuisances, *delays, gain))
+        return self.replaced(nuisances=(*self.nuisances, *delays, gain), retimed=retimed)
 
     def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""

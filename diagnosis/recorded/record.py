@@ -202,6 +202,11 @@ class Record:
         """Whether all these signals are there for most of the test."""
         return all(name in self.signals and self.present[name].mean() > 0.5 for name in names)
 
+    @property
+    def retimed(self) -> bool:
+        """Whether its readings, or the plan's ground motion, were put onto another clock."""
+        return self.fast != 0.0 or self.early != 0.0 or self.start is not None
+
     def put_right(self, fast: float, early: float = 0.0) -> Record:
         """The record with readings of a clock that is fast by a rate, or `early` (s), on the clock of the commands.
 

@@ -13,10 +13,13 @@ from diagnosis.findings import report
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
 from diagnosis.recorded.ground import Ground
+from diagnosis.recorded.nuisances import LoggedReadings
+from diagnosis.signals import clock
 from models.registry import Array
 from models.system import System
 from tests.diagnosis.cases import STRONGEST, Cases, imported, lab_a, lab_b
 
+INTERVAL = 2e-3  # s
 FILTER = signal.butter(4, 100.0, fs=500.0)  # before the converter, Hz
 FRICTION = {"column.friction": {"force": 900.0}}
 
@@ -44,6 +47,18 @@ def test_a_gain_of_all_channels_within_their_calibration_is_said(cases: Cases) -
     told = [text for text in found.warnings if text.startswith("The readings")]
     assert any("1.2 % larger than the plan says" in text for text in told)
     assert not any("larger" in text for text in examine(imported(cases.record())).warnings)
+
+
+@pytest.mark.parametrize(("effect", "early"), [({}, 4e-4), ({"table.bandwidth": {"factor": 1.3}}, 0.0)])
+def test_readings_that_are_early_by_less_than_an_interval_are_those_of_a_logger(
+    effect: dict[str, dict[str, float]], early: float, cases: Cases
+) -> None:
+    whole = cases.record(effect)
+    ahead = clock.put_right
+    found = examine(imported(whole, lambda read: ahead(read, 0.0, stepped=False, early=-early / INTERVAL)))
+    assert [item.effects for item in found.verdicts if item.effects] == ([tuple(effect)] if effect else [])
+    delays = [one for one in found.verdicts[-1].search.data.part.nuisances if isinstance(one, LoggedReadings)]
+    assert {one.least for one in delays if one.parameter == "delay"} == {-INTERVAL}
 
 
 def test_a_hum_far_above_the_noise_is_no_gap(cases: Cases) -> None:

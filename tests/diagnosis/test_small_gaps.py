@@ -17,7 +17,7 @@ from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import at_any_size, search
 from diagnosis.fits.unexplained import foresees, leaves, model_error
 from diagnosis.recorded.parts import FINE_ERROR, MODEL_ERROR, LaboratoryPart
-from diagnosis.recorded.record import Record
+from diagnosis.recorded.record import Delay, Late, Record
 from tests.diagnosis.cases import Cases, lab_a, lab_b
 
 TABLE, STROKE = 0, 2  # places of the table's displacement and the damper's stroke among the readings
@@ -61,6 +61,18 @@ def test_so_small_a_gap_is_not_looked_for_behind_a_filter(cases: Cases) -> None:
     found = at_any_size(data, Scales(whole))
     assert found[1] is None
     assert found[0].data.erring == MODEL_ERROR
+
+
+@pytest.mark.parametrize("late", [0.0, 1e-3])
+def test_so_small_a_gap_is_not_looked_for_where_readings_were_moved_in_time(
+    cases: Cases, late: float
+) -> None:
+    whole = cases.record({}, duration=8.0)
+    part = lagging(whole, WIDTH).logged(Late(motion=Delay(late)))
+    assert part.retimed == (late > 0.0)
+    assert replace(whole, fast=2e-5).retimed
+    data = residuals.prepare(part, whole)
+    assert data.fine.erring == (MODEL_ERROR if late else FINE_ERROR)
 
 
 def test_a_gap_that_the_inputs_foresee_is_seen_below_what_its_energy_tells(cases: Cases) -> None:

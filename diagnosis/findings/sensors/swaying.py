@@ -18,7 +18,7 @@ from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.unexplained import BOTH, MATERIAL
-from diagnosis.recorded.parts import FINE_ERROR, LaboratoryPart
+from diagnosis.recorded.parts import LaboratoryPart
 from models.registry import Array
 
 # Nats of a line beyond what noise has, from which on it counts, and from which on another reading may show it as well.
@@ -75,7 +75,7 @@ def own_error(verdict: PartVerdict, part: LaboratoryPart) -> OwnError | None:
     """The share of the motion that changes in time of the reading that shows it most."""
     data = verdict.search.data
     found = sways(verdict.search.chosen)
-    least = np.maximum(MATERIAL, BOTH * FINE_ERROR * data.part.level / data.sigma)
+    least = np.maximum(MATERIAL, BOTH * data.fine.erring * data.part.level / data.sigma)
     smooth = data.rounded <= ROUNDED * data.white
     seen = [
         place
