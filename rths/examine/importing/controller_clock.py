@@ -9,8 +9,9 @@ are out of step.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +36,7 @@ OFTEN = 0.5  # share of them from which on those whose rows are not on a tick de
 # it was, and share of the motion's rms by which these must differ.
 AROUND, SAME, APART = 2, 0.02, 1e-3
 NEARBY, TRIED = (5e-2, 1e-3, 2e-5), 101  # of an interval, closer and closer, and beginnings within it
+ENOUGH = 20_000  # rows, by which a beginning is found
 ONE_LESS = 2  # the bound but one of a block counts: a time may be printed badly
 
 
@@ -139,15 +141,11 @@ def clock_by_ground(times: Array, values: Array, ground: Array, interval: float)
     if np.count_nonzero(same) < max(LEAST_RUNS, (1.0 - MISSED) * np.count_nonzero(clear)):
         return None
     high = (times - interval * near[np.arange(best.size), best])[same]
-    block, when = (usual[same] // BLOCK).astype(int), times[same]
+    when = times[same]
     rows = [
-        (
-            float(np.mean(when[own])),
-            float(np.sort(high[own])[-ONE_LESS]) - interval,
-            float(np.sort(high[own])[ONE_LESS - 1]),
-        )
-        for own in (block == one for one in np.unique(block))
-        if np.count_nonzero(own) > 1.0 / MISSED
+        (float(np.mean(when[own])), highs[-ONE_LESS] - interval, highs[ONE_LESS - 1])
+        for own in blocks(usual[same])
+        for highs in (np.sort(high[own]),)
     ]
     agreed = [row for row in rows if row[1] <= row[2] + 2.0 * ROUNDED * interval]
     if len(agreed) <= CHANGING * len(rows):
@@ -159,6 +157,8 @@ def clock_by_ground(times: Array, values: Array, ground: Array, interval: float)
 
 def refined(clock: ControllerClock, times: Array, ticks: npt.NDArray[np.int_]) -> ControllerClock:
     """The clock that begins so that most rows at times (n,), s, lie behind the ticks (n,) at which they were taken."""
+    few = max(1, times.size // ENOUGH)
+    times, ticks = times[::few], ticks[::few]
     for share in NEARBY:
         nearby = clock.begin + share * clock.interval * np.linspace(-1.0, 1.0, TRIED)
         fit = [np.count_nonzero(np.floor(clock._replace(begin=one).places(times)) == ticks) for one in nearby]
@@ -169,15 +169,12 @@ def refined(clock: ControllerClock, times: Array, ticks: npt.NDArray[np.int_]) -
 
 def told(times: Array, values: Array, interval: float) -> ControllerClock | None:
     """The clock by the bounds of one channel (n,); None where they contradict each other."""
+    if np.count_nonzero(np.diff(values)) > (1.0 + OTHER) * (times[-1] - times[0]) / interval + 1.0:
+        return None  # it changes between ticks
     low, high = bounds(times, values, interval)
     if low.size < LEAST_RUNS:
         return None
-    block = np.floor(0.5 * (low + high) / (BLOCK * interval)).astype(int)
-    rows = [
-        limits(low[block == one], high[block == one], interval)
-        for one in np.unique(block)
-        if np.count_nonzero(block == one) > 1.0 / MISSED
-    ]
+    rows = [limits(low[own], high[own], interval) for own in blocks(0.5 * (low + high) / interval)]
     # in the block where the ticks pass a row of a clock that is out of step, one half contradicts the other
     agreed = [row for row in rows if row[1] <= row[2] + 2.0 * ROUNDED * interval]
     if len(agreed) <= CHANGING * len(rows):
@@ -185,6 +182,15 @@ def told(times: Array, values: Array, interval: float) -> ControllerClock | None
     middle, least, most = np.array(agreed).T
     shift = interval * turns(0.5 * (least + most) / interval)
     return within(middle, least + shift, most + shift, interval)
+
+
+def blocks(ticks: Array) -> Iterator[slice]:
+    """The places of increasing times (n,), in ticks, block by block of BLOCK ticks; without those of few."""
+    block = np.floor(ticks / BLOCK)
+    ends = [0, *(np.flatnonzero(np.diff(block)) + 1), block.size]
+    for first, behind in itertools.pairwise(ends):
+        if behind - first > 1.0 / MISSED:
+            yield slice(first, behind)
 
 
 def bounds(times: Array, values: Array, interval: float) -> tuple[Array, Array]:
@@ -238,8 +244,8 @@ def within(
     It is in step, or begins with a tick, where that is within them as well: many loggers do by design.
     """
     rates = STEP * np.arange(-round(FASTEST / STEP), round(FASTEST / STEP) + 1)
-    low = np.max(least - rates[:, None] * middle, axis=1) - ROUNDED * interval
-    high = np.min(most - rates[:, None] * middle, axis=1) + ROUNDED * interval
+    low = np.array([np.max(least - fast * middle) for fast in rates]) - ROUNDED * interval
+    high = np.array([np.min(most - fast * middle) for fast in rates]) + ROUNDED * interval
     allowed = low <= high
     usual = allowed & (np.abs(rates) <= QUARTZ)
     places = np.flatnonzero(usual if usual.any() else allowed)
