@@ -27,9 +27,7 @@ from rths.examine.importing.import_map import ImportMap, SignalSource, in_unit, 
 FAR_APART, TOO_CLOSE = 90.0, 900.0
 GAP = 4.5  # usual distances of rows from which on rows are missing between two: more than three of them
 FOR_A_SPLINE = 4  # rows at least
-FAST = (
-    1.03  # rows in an interval from which on each tick has one that shows whether a channel holds its value
-)
+FAST = 1.03  # rows in an interval, from which on they show whether a channel holds its value
 EVENLY = 1.5  # usual distances of a channel's own rows, from which on one is missing
 ON_TICKS = 1e-3  # of an interval, within which a row is on its tick: times in a text file are rounded to a microsecond
 
