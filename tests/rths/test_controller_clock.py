@@ -134,6 +134,16 @@ def test_a_logger_of_the_controller_s_own_rate_shows_where_a_tick_passes_a_row(p
     assert np.setdiff1d(t, seen).size <= 1  # a tick has no row where the logger is slow
 
 
+@pytest.mark.parametrize("rate", [50.0, 1024.0])
+def test_a_clock_that_gains_many_ticks_is_followed(rate: float) -> None:
+    times = np.arange(round(200.0 * rate)) / rate
+    ticks = np.floor((times / (1.0 - 8e-5) + 1e-4) / INTERVAL).astype(int)
+    ground = np.sin(2.0 * np.pi * np.array([[0.7], [1.9]]) * INTERVAL * np.arange(101_000.0)).sum(axis=0)
+    found = clock_by_ground(times, ground[ticks], ground, INTERVAL)
+    assert found is not None
+    assert found.fast == pytest.approx(-8e-5, abs=5e-6)  # eight ticks in all
+
+
 def test_a_logger_of_the_controller_s_own_rate_that_is_in_step_stays_as_it_is() -> None:
     times, ticks, found = by_ground(1.0 / INTERVAL, 1.3e-3, 0.0)
     assert found == ControllerClock(INTERVAL, 0.0, 0.0)

@@ -131,20 +131,14 @@ def clock_by_ground(times: Array, values: Array, ground: Array, interval: float)
 
     None where what was recorded is no number of the controller, held from tick to tick.
     """
-    usual = np.floor(times / interval + ON_TICK).astype(int)
-    near = usual[:, None] + np.arange(-AROUND, AROUND + 1)
-    away = np.abs(ground[np.clip(near, 0, ground.size - 1)] - values[:, None])
-    best = np.argmin(away, axis=1)
-    nearest, other = np.partition(away, 1, axis=1)[:, :2].T
-    clear = (other > APART * float(np.sqrt(np.mean(np.square(ground))))) & (near[:, 0] >= 0)
-    same = clear & (nearest < SAME * other)
-    if np.count_nonzero(same) < max(LEAST_RUNS, (1.0 - MISSED) * np.count_nonzero(clear)):
+    same, tick = in_force(times, values, ground, interval)
+    if same is None:
         return None
-    high = (times - interval * near[np.arange(best.size), best])[same]
-    when = times[same]
+    when, ticks = times[same], tick[same]
+    high = when - interval * ticks
     rows = [
         (float(np.mean(when[own])), highs[-ONE_LESS] - interval, highs[ONE_LESS - 1])
-        for own in blocks(usual[same])
+        for own in blocks(when / interval)
         for highs in (np.sort(high[own]),)
     ]
     agreed = [row for row in rows if row[1] <= row[2] + 2.0 * ROUNDED * interval]
@@ -152,7 +146,31 @@ def clock_by_ground(times: Array, values: Array, ground: Array, interval: float)
         return None
     middle, least, most = np.array(agreed).T
     found = within(middle, least, most, interval, turning=False)
-    return refined(found, when, near[np.arange(best.size), best][same]) if found and found.between else found
+    return refined(found, when, ticks) if found and found.between else found
+
+
+def in_force(
+    times: Array, values: Array, ground: Array, interval: float
+) -> tuple[npt.NDArray[np.bool_] | None, npt.NDArray[np.int_]]:
+    """Which rows (n,) show at which tick they were taken, and that tick; no rows where too few of those that could do.
+
+    What a clock that is fast or slow gains until a block of rows is known from the blocks before.
+    """
+    usual = np.floor(times / interval + ON_TICK).astype(int)
+    tick, clear, same = usual.copy(), np.zeros(usual.size, dtype=bool), np.zeros(usual.size, dtype=bool)
+    least, gained = APART * float(np.sqrt(np.mean(np.square(ground)))), 0
+    for own in blocks(times / interval, fewest=0):
+        near = usual[own, None] + gained + np.arange(-AROUND, AROUND + 1)
+        away = np.abs(ground[np.clip(near, 0, ground.size - 1)] - values[own, None])
+        best = np.argmin(away, axis=1)
+        nearest, other = np.partition(away, 1, axis=1)[:, :2].T
+        clear[own] = (other > least) & (near[:, 0] >= 0)
+        same[own] = clear[own] & (nearest < SAME * other)
+        tick[own] = near[np.arange(best.size), best]
+        if same[own].any():
+            gained = round(float(np.median((tick[own] - usual[own])[same[own]])))
+    few = np.count_nonzero(same) < max(LEAST_RUNS, (1.0 - MISSED) * np.count_nonzero(clear))
+    return None if few else same, tick
 
 
 def refined(clock: ControllerClock, times: Array, ticks: npt.NDArray[np.int_]) -> ControllerClock:
@@ -184,12 +202,16 @@ def told(times: Array, values: Array, interval: float) -> ControllerClock | None
     return within(middle, least + shift, most + shift, interval)
 
 
-def blocks(ticks: Array) -> Iterator[slice]:
-    """The places of increasing times (n,), in ticks, block by block of BLOCK ticks; without those of few."""
-    block = np.floor(ticks / BLOCK)
+def blocks(ticks: Array, fewest: float = 1.0 / MISSED) -> Iterator[slice]:
+    """The places of increasing times (n,), in ticks, block by block, of those with more than `fewest`.
+
+    A block is as long as `BLOCK` ticks, or as holds twice so many as are needed for few of them to be missed.
+    """
+    apart = (ticks[-1] - ticks[0]) / max(1, ticks.size - 1)
+    block = np.floor(ticks / max(BLOCK, 2.0 * apart / MISSED))
     ends = [0, *(np.flatnonzero(np.diff(block)) + 1), block.size]
     for first, behind in itertools.pairwise(ends):
-        if behind - first > 1.0 / MISSED:
+        if behind - first > fewest:
             yield slice(first, behind)
 
 
