@@ -195,13 +195,12 @@ def through_logger(
 
 
 def of_logger(
-    lab: RecordedLaboratory, late: Late, spread: float | None, held: float = 0.0
+    lab: RecordedLaboratory, late: Late, spread: float | None, held: float = 0.0, early: float = 0.0
 ) -> tuple[LoggedReadings, ...]:
     """Delays of force readings and of the others by a logger of which nothing is stated, about those found elsewhere.
 
     `spread` is their standard deviation, s; None for what is usual. `held` is the longest that a command may be held
-    between rows, s; 0 where a controller holds it from tick to tick, after which a logger may read up to an interval
-    later, so that its readings are early.
+    between rows, s, and `early` the longest after a tick that a logger may read what belongs to it.
     """
     rows, groups = lab.kind.channels.measured, ((late.force, True), (late.motion, False))
     return tuple(
@@ -211,7 +210,7 @@ def of_logger(
             lab,
             those,
             about,
-            0.0 if held else -min(lab.plan.test.interval, HELD),
+            -min(early, HELD),
         )
         for (about, unsure), force in groups
         if (those := tuple(row.name for row in rows if (row.unit == "N") == force))

@@ -116,11 +116,6 @@ def of_sites(record: Record, sites: Collection[str], plan: Plan) -> tuple[Effect
     return tuple(one for one in found if not one.in_samples and not (one.timed and record.static))
 
 
-def held(lab: RecordedLaboratory) -> bool:
-    """Whether a laboratory's transfer system holds its command from the tick on, by its plan."""
-    return lab.kind.name == COLUMN and lab.plan.actuator.command == "held"
-
-
 class Measured:
     """What parts have in common whose readings stand for themselves."""
 
@@ -160,8 +155,11 @@ class LaboratoryPart:
         self.retimed = record.retimed or any(channel.interpolated for channel in self.channels)
         self.free = nothing_stated(record.mapped, lab)
         self.built_in = lab.kind.name in KINDS  # a user's kind has steps of its own within an interval
-        self.steps = 0 if held(lab) else record.steps if self.built_in else min(record.steps, 1)
+        # an actuator that holds its command from the tick on needs no straight lines
+        held = lab.kind.name == COLUMN and lab.plan.actuator.command == "held"
+        self.steps = 0 if held else record.steps if self.built_in else min(record.steps, 1)
         self._interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
+        self.early = 0.0 if self.steps or record.numbered else self._interval
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)
         sites = [
@@ -315,7 +313,9 @@ class LaboratoryPart:
         """
         lab, held = self.lab, self._interval if self.steps else 0.0
         retimed = self.retimed or max(late.force.about, late.motion.about) > BETWEEN
-        delays = of_logger(lab, late, spread, held) if self.free else of_filters(lab, self.channels, held)
+        delays = of_filters(lab, self.channels, held)
+        if self.free:
+            delays = of_logger(lab, late, spread, held, self.early)
         if any(channel.calibration > 0.0 for channel in self.channels):
             return self.replaced(nuisances=(*self.nuisances, *delays), retimed=retimed)
         gain = LoggedReadings("gain", CALIBRATED, self.lab, self.lab.kind.channels.names)

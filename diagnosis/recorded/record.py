@@ -207,6 +207,11 @@ class Record:
         """Whether its readings, or the plan's ground motion, were put onto another clock."""
         return self.fast != 0.0 or self.early != 0.0 or self.start is not None
 
+    @property
+    def numbered(self) -> bool:
+        """Whether it holds the number of a message in each row, as what the controllers log themselves."""
+        return self.has("command_seq") or any(self.has(lab.kind.channels.used_seq) for lab in self.labs)
+
     def put_right(self, fast: float, early: float = 0.0) -> Record:
         """The record with readings of a clock that is fast by a rate, or `early` (s), on the clock of the commands.
 
@@ -220,15 +225,11 @@ class Record:
             for name, force in used.items()
             if self.has(name, force) and np.isin(self.signals[name], self.signals[force]).mean() > SAME
         ]
+        ticks, read = early / self.plan.test.interval, [name for name in names if self.present[name].any()]
+        stepped = {name: quantum(self.signals[name][self.present[name]]) > 0.0 for name in read}
         moved = {
-            name: clock.put_right(
-                self.signals[name],
-                fast,
-                stepped=quantum(self.signals[name][self.present[name]]) > 0.0,
-                early=early / self.plan.test.interval,
-            )
-            for name in names
-            if self.present[name].any()
+            name: clock.put_right(self.signals[name], fast, stepped=yes, early=ticks)
+            for name, yes in stepped.items()
         }
         return replace(self, signals=self.signals | moved, fast=self.fast + fast, early=self.early + early)
 

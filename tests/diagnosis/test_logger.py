@@ -12,8 +12,10 @@ from diagnosis.diagnose import examine
 from diagnosis.findings import report
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import fitting, residuals, sensor_noise, settling
+from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.nuisances import LoggedReadings
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals import clock
 from models.registry import Array
 from models.system import System
@@ -53,12 +55,18 @@ def test_a_gain_of_all_channels_within_their_calibration_is_said(cases: Cases) -
 def test_readings_that_are_early_by_less_than_an_interval_are_those_of_a_logger(
     effect: dict[str, dict[str, float]], early: float, cases: Cases
 ) -> None:
-    whole = cases.record(effect)
-    ahead = clock.put_right
-    found = examine(imported(whole, lambda read: ahead(read, 0.0, stepped=False, early=-early / INTERVAL)))
+    whole = imported(
+        cases.record(effect), lambda read: clock.put_right(read, 0.0, stepped=False, early=-early / INTERVAL)
+    )
+    assert whole.numbered
+    beside = replace(
+        whole, signals={name: row for name, row in whole.signals.items() if not name.endswith("_seq")}
+    )
+    found = examine(beside)
     assert [item.effects for item in found.verdicts if item.effects] == ([tuple(effect)] if effect else [])
     delays = [one for one in found.verdicts[-1].search.data.part.nuisances if isinstance(one, LoggedReadings)]
     assert {one.least for one in delays if one.parameter == "delay"} == {-INTERVAL}
+    assert [one.early for one in parts_of(whole) if isinstance(one, LaboratoryPart)] == [0.0, 0.0]
 
 
 def test_a_hum_far_above_the_noise_is_no_gap(cases: Cases) -> None:
