@@ -393,8 +393,7 @@ def test_a_small_gap_that_the_inputs_foresee_is_an_unknown_effect(
     whole = cases.record({}, duration=8.0)
     part = lab_b(whole)
     measured, stroke = part.measured.copy(), part.measured[:, 2]
-    noise = residuals.prepare(part, whole).white[1]
-    measured[:, 1] += share * noise * stroke / stroke.std()
+    measured[:, 1] += share * residuals.prepare(part, whole).white[1] * stroke / stroke.std()
     bare = settling.settled(fitting.fit(residuals.prepare(part.replaced(measured=measured), whole), {}))
     found = Search(bare.data, bare, bare, ())
     assert found.left < SEEN

@@ -13,14 +13,11 @@ from rths.examine.importing.controller_clock import ControllerClock, clock_by_gr
 INTERVAL, SECONDS = 2e-3, 12.0
 
 
-def logged(rate: float, begin: float, ppm: float, late: float = 0.0) -> tuple[Array, Array, Array]:
-    """Times by the logger of rows that begin some time after a tick, the ticks in force and a value that is held.
-
-    The controller shows each value `late` s after its tick.
-    """
+def logged(rate: float, begin: float, ppm: float) -> tuple[Array, Array, Array]:
+    """Times by the logger of rows that begin some time after a tick, the ticks in force and a value that is held."""
     times = np.arange(round(SECONDS * rate)) / rate
     true = begin + times / (1.0 + 1e-6 * ppm)
-    ticks = np.floor((true - late) / INTERVAL + 1e-9)
+    ticks = np.floor(true / INTERVAL + 1e-9)
     return times, ticks, np.sin(3.0 * INTERVAL * ticks)
 
 
@@ -66,7 +63,7 @@ def test_the_number_of_a_message_is_that_which_was_in_force_from_its_tick_on(
 
 
 def test_rows_of_twice_the_rate_say_between_which_of_them_the_ticks_are() -> None:
-    times, ticks, values = logged(1000.0, -0.3e-3, 0.0, late=0.0)
+    times, ticks, values = logged(1000.0, -0.3e-3, 0.0)
     found = clock_of(times, [values], INTERVAL)
     assert found is not None
     assert off(found, -0.3e-3, 0.0) < 0.5e-3

@@ -337,7 +337,8 @@ def of_building(record: Record, parts: Sequence[Part]) -> list[AlikeReadings]:
         return []
     if found.treated or record.gapped:
         return []
-    own, every = (LoggedBuilding(found).demanded(used=used) for used in (False, True))
+    view = LoggedBuilding(found)
+    own, every = (view.demanded(used=used) for used in (False, True))
     alone = AlikeReadings(MASTER, found.sources[:1], own)
     used_others = low_pass.likelier_whole(every, own) < BEYOND
     return [*([alone] if used_others else []), AlikeReadings(MASTER, found.sources, every)]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from models.registry import Array
 
 LEAST_RUNS = 40  # of rows of one value, from which on they may be those of a controller
 CHANGING = 0.5  # share of the ticks at which such a channel changes at least
+AGREEING = 0.5  # share of the blocks of a recording whose bounds do not contradict each other, at least
 BLOCK = 100  # ticks, in which a clock gains little
 # Share of the bounds in a block that may be missed: times are rounded when printed, and a controller is late at times.
 MISSED = 0.05
@@ -120,7 +121,7 @@ def clock_of(times: Array, channels: Iterable[Array], interval: float) -> Contro
     if ratio > 1.0 - ROUNDED:
         return None
     for values in sorted(channels, key=lambda one: -np.count_nonzero(np.diff(one))):
-        found = told(times, values, interval)
+        found = clock_by_changes(times, values, interval)
         if found is not None and found.holds(times, values):
             return found
     return None
@@ -141,11 +142,8 @@ def clock_by_ground(times: Array, values: Array, ground: Array, interval: float)
         for own in blocks(when / interval)
         for highs in (np.sort(high[own]),)
     ]
-    agreed = [row for row in rows if row[1] <= row[2] + 2.0 * ROUNDED * interval]
-    if len(agreed) <= CHANGING * len(rows):
-        return None
-    middle, least, most = np.array(agreed).T
-    found = within(middle, least, most, interval, turning=False)
+    limits = agreeing(rows, interval)
+    found = None if limits is None else within(limits, interval, turning=False)
     return refined(found, when, ticks) if found and found.between else found
 
 
@@ -185,21 +183,29 @@ def refined(clock: ControllerClock, times: Array, ticks: npt.NDArray[np.int_]) -
     return clock
 
 
-def told(times: Array, values: Array, interval: float) -> ControllerClock | None:
+def clock_by_changes(times: Array, values: Array, interval: float) -> ControllerClock | None:
     """The clock by the bounds of one channel (n,); None where they contradict each other."""
     if np.count_nonzero(np.diff(values)) > (1.0 + OTHER) * (times[-1] - times[0]) / interval + 1.0:
         return None  # it changes between ticks
     low, high = bounds(times, values, interval)
     if low.size < LEAST_RUNS:
         return None
-    rows = [limits(low[own], high[own], interval) for own in blocks(0.5 * (low + high) / interval)]
-    # in the block where the ticks pass a row of a clock that is out of step, one half contradicts the other
-    agreed = [row for row in rows if row[1] <= row[2] + 2.0 * ROUNDED * interval]
-    if len(agreed) <= CHANGING * len(rows):
+    rows = [in_common(low[own], high[own], interval) for own in blocks(0.5 * (low + high) / interval)]
+    limits = agreeing(rows, interval)
+    if limits is None:
         return None
-    middle, least, most = np.array(agreed).T
-    shift = interval * turns(0.5 * (least + most) / interval)
-    return within(middle, least + shift, most + shift, interval)
+    limits[1:] += interval * turns(0.5 * limits[1:].sum(axis=0) / interval)
+    return within(limits, interval)
+
+
+def agreeing(rows: Sequence[tuple[float, float, float]], interval: float) -> Array | None:
+    """The middle of each block and its limits (3, blocks), s, of those that do not contradict themselves.
+
+    In the block where the ticks of a clock that is out of step pass a row, one half contradicts the other. None where
+    most blocks do.
+    """
+    agreed = [row for row in rows if row[1] <= row[2] + 2.0 * ROUNDED * interval]
+    return np.array(agreed).T if len(agreed) > AGREEING * len(rows) else None
 
 
 def blocks(ticks: Array, fewest: float = 1.0 / MISSED) -> Iterator[slice]:
@@ -228,7 +234,7 @@ def bounds(times: Array, values: Array, interval: float) -> tuple[Array, Array]:
     return low[kept], high[kept]
 
 
-def limits(low: Array, high: Array, interval: float) -> tuple[float, float, float]:
+def in_common(low: Array, high: Array, interval: float) -> tuple[float, float, float]:
     """The middle of a block of bounds (runs,), s, and between which times after a multiple of an interval they agree.
 
     Few of them may be missed.
@@ -256,15 +262,13 @@ def turns(centre: Array) -> Array:
     return result
 
 
-def within(
-    middle: Array, least: Array, most: Array, interval: float, *, turning: bool = True
-) -> ControllerClock | None:
-    """The clock within limits (blocks,) about times (blocks,), s; None where none is.
+def within(limits: Array, interval: float, *, turning: bool = True) -> ControllerClock | None:
+    """The clock within limits (3, blocks), the middle of each block and limits there, s; None where none is.
 
-    Limits that are `turning` hold for any tick, and the first one is the one nearest to the first row.
-
-    It is in step, or begins with a tick, where that is within them as well: many loggers do by design.
+    Limits that are `turning` hold for any tick, and the first one is the one nearest to the first row. The clock is in
+    step, or begins with a tick, where that is within them as well: many loggers do by design.
     """
+    middle, least, most = limits
     rates = STEP * np.arange(-round(FASTEST / STEP), round(FASTEST / STEP) + 1)
     low = np.array([np.max(least - fast * middle) for fast in rates]) - ROUNDED * interval
     high = np.array([np.min(most - fast * middle) for fast in rates]) + ROUNDED * interval

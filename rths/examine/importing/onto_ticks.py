@@ -50,7 +50,7 @@ class OnTicks:
         return [name for name, row in self.stated.items() if row.interpolated]
 
 
-class Ticks(NamedTuple):
+class TickGrid(NamedTuple):
     """The ticks on which signals are wanted."""
 
     t: Array  # s, by the controller
@@ -95,10 +95,10 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
         gaps, begin = missing_rows(theirs), float(theirs[0])
         theirs = theirs - begin
         t = np.arange(int(np.floor(theirs[-1] / interval + 1e-9)) + 1, dtype=np.float64) * interval
-    clock = None if mapping.static else controllers(mapping, table, data, theirs, rows)
+    clock = None if mapping.static else clock_in(mapping, table, data, theirs, rows)
     if clock is not None:  # and no tick after the last row
         t = np.arange(int(clock.places(theirs[-1:])[0] + ON_TICKS) + 1, dtype=np.float64) * interval
-    ticks = Ticks(t, interval, clock)
+    ticks = TickGrid(t, interval, clock)
     rate = 0.0 if mapping.static else rate_of(theirs)
     known, computed = lab_signals(mapping.plan), of_controller(mapping.plan)
     found = OnTicks(t, {}, {}, {}, begin, gaps, clock)
@@ -126,7 +126,7 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
     return found
 
 
-def controllers(
+def clock_in(
     mapping: ImportMap, table: DataTable, data: Path, theirs: Array, rows: Any
 ) -> ControllerClock | None:
     """The clock of the controller by times (rows,) of the data, s; None where nothing tells it."""
