@@ -10,6 +10,9 @@ import pytest
 from diagnosis.diagnose import diagnose
 from diagnosis.findings.sensors import swaying
 from diagnosis.findings.sites.signatures import alone
+from diagnosis.findings.verdict import PartVerdict
+from diagnosis.fits import fitting, residuals, settling
+from diagnosis.fits.search import Search
 from diagnosis.recorded.record import Record
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_a, lab_b
@@ -52,6 +55,17 @@ def test_a_gain_that_sways_is_an_effect_of_its_reading(cases: Cases) -> None:
     said = [one for one in found.warnings if one.startswith("damper_force errs by a share of its motion")]
     assert len(said) == 1
     assert f"at {SWAY:.2g} Hz" in said[0]
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_a_small_sway_does_not_count_where_readings_were_moved_in_time(cases: Cases, moved: bool) -> None:
+    whole = cases.record(duration=8.0)
+    read = whole.signals["damper_stroke"]
+    swayed = read + 5e-4 * (read - read[0]) * np.sin(2.0 * np.pi * SWAY * whole.time)
+    part = lab_b(replace(whole, signals=whole.signals | {"damper_stroke": swayed})).replaced(retimed=moved)
+    bare = settling.settled(fitting.fit(residuals.prepare(part, whole), {}))
+    verdict = PartVerdict(Search(bare.data, bare, bare, ()), "tolerances", 1.0, (), ())
+    assert (swaying.own_error(verdict, part) is None) == moved
 
 
 def test_the_frequency_and_size_of_a_share_are_found() -> None:
