@@ -81,6 +81,17 @@ def test_noise_and_a_steady_share_have_no_line(seed: int) -> None:
     assert swaying.line(noise(seed), motion(), INTERVAL).nats < swaying.SURE
 
 
+def test_a_reading_that_is_late_by_little_does_not_sway() -> None:
+    t = np.arange(COUNT) * INTERVAL
+    burst = 100.0 * np.exp(-(((t - 3.0) / 0.5) ** 2)) * np.sin(2.0 * np.pi * 2.1 * t)
+    slope = np.gradient(burst)
+    left = noise(3) + slope / slope.std()
+    motions = np.stack([burst, slope, np.gradient(slope)], axis=1)
+    freed = swaying.without_steady(left, motions)
+    assert max(swaying.line(freed, one, INTERVAL).nats for one in motions.T) < swaying.MAYBE
+    assert swaying.line(left, slope, INTERVAL).nats > swaying.SURE
+
+
 def test_what_is_measured_by_an_error_of_the_model_as_well_is_not_credited() -> None:
     error = motion() * wave()
     whole = swaying.line(0.02 * (noise(1) + 0.5 * error / error.std()), motion(), INTERVAL)

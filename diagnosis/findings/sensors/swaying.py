@@ -47,11 +47,22 @@ def sways(fit: Fit) -> list[Sway]:
     interval = data.system.plan.test.interval * data.group
     result = []
     for place, live in enumerate(data.live):
-        left = fit.reduced[:, place]
-        found = [line(left, x[:, place], interval) for x in motions] if live else []
+        moved = np.stack([x[:, place] for x in motions], axis=1)
+        left = without_steady(fit.reduced[:, place], moved)
+        found = [line(left, one, interval) for one in moved.T] if live else []
         best = max(found, key=lambda one: one.nats, default=Sway(0.0, 0.0, 0.0))
         result.append(best._replace(ratio=best.ratio / math.sqrt(data.group)))
     return result
+
+
+def without_steady(left: Array, motions: Array) -> Array:
+    """What is left (n,) without shares of motions (n, 3) that do not change in time.
+
+    Of a motion that is strong for a short time such a share, as of a channel that is 50 µs late, shows in many lines.
+    """
+    size = np.sqrt(np.sum(motions**2, axis=0))
+    moved = motions / np.where(size > 0.0, size, 1.0)
+    return np.asarray(left - moved @ np.linalg.lstsq(moved, left)[0])
 
 
 def line(left: Array, motion: Array, interval: float) -> Sway:
