@@ -50,6 +50,16 @@ def test_what_a_controller_holds_is_no_curve_and_tells_when_its_ticks_are(
     assert known(run).channel("master", "column_displacement").interpolated
 
 
+def test_what_a_controller_held_where_rows_are_lost_is_between_its_neighbours(bring: Any) -> None:
+    rows = np.delete(np.arange(800) / 200.0, [401, 402, 403])  # both of a tick and one of the tick before
+    steps = 5.0 * np.sin(2.0 * np.pi * 0.7 * 0.01 * np.floor(rows / 0.01 + 1e-9))
+    code, run = bring(table("t,u,y", rows, steps, 5.0 * np.sin(2.0 * np.pi * 0.7 * rows)), DRIVE)
+    assert code == 0
+    command = run.columns["master"]["actuator_command"]
+    expected = 5e-3 * np.sin(2.0 * np.pi * 0.7 * 0.01 * np.arange(command.size))
+    assert np.max(np.abs(command - expected)[1:-1]) < 3e-6  # the row before would be off by 2e-4
+
+
 def test_the_ground_motion_tells_the_ticks_of_a_slower_logger(bring: Any, tmp_path: Path) -> None:
     ground = np.sin(2.0 * np.pi * TIMES) * (TIMES < 3.5)
     (tmp_path / "motion.csv").write_text(table("time (s),acceleration (m/s2)", TIMES, ground))
@@ -68,6 +78,9 @@ def test_the_ground_motion_tells_the_ticks_of_a_slower_logger(bring: Any, tmp_pa
     expected = 5e-3 * np.sin(2.0 * np.pi * 0.7 * found["t"])
     for name in ("displacement", "column_displacement"):
         assert np.max(np.abs(found[name] - expected)[8:-8]) < 2e-5  # 3 ms would be 7e-5
+    assert (
+        np.max(np.abs(found["ground_acceleration"] - ground[: found["t"].size])) < 1e-5
+    )  # a cubic misses the corner
     assert known(run).channel("master", "displacement").interpolated
 
 

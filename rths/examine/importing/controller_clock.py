@@ -81,15 +81,18 @@ class ControllerClock(NamedTuple):
             return False
         return bool(np.mean(differ[together]) < OTHER)
 
-    def held(self, times: Array, values: Array, t: Array) -> Array:
-        """What a channel that holds, (n,) at times (n,) of the logger, s, has from each tick at `t` on.
+    def held(self, times: Array, values: Array, t: Array) -> tuple[Array, Array]:
+        """The ticks (m,) at `t` that have a row, s by the controller, and what a channel that holds has from them on.
 
-        It is the row nearest to the middle of an interval, so that each tick must have a row.
+        The channel is (n,) at times (n,) of the logger, s. Of the rows of a tick the one nearest to the middle of its
+        interval counts.
         """
         middle = self.ticks(t) + 0.5 * self.interval
         after = np.clip(np.searchsorted(times, middle), 1, times.size - 1)
         before = after - 1
-        return values[np.where(middle - times[before] < times[after] - middle, before, after)]
+        nearest = np.where(middle - times[before] < times[after] - middle, before, after)
+        there = np.floor(self.places(times[nearest]) + ON_TICK) == np.rint(t / self.interval)
+        return t[there], values[nearest[there]]
 
     def seen(self, times: Array, values: Array) -> tuple[Array, Array]:
         """The ticks (m,), s by the controller, whose values (m,) were in force at times (n,) of the logger, s."""

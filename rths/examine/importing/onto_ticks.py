@@ -22,6 +22,7 @@ from report.text.tabular import DataTable
 from rths.examine.importing.controller_clock import ControllerClock, clock_by_ground, clock_of
 from rths.examine.importing.import_map import ImportMap, SignalSource, in_unit, lab_signals
 
+GROUND = "ground_acceleration"  # the signal that the plan knows as well
 # Distance of rows over the plan's interval, and the plan's interval over it, from which on the time has another unit:
 # milliseconds for seconds make 1000, while minutes make 60 and an oscilloscope has a hundred rows in an interval.
 FAR_APART, TOO_CLOSE = 90.0, 900.0
@@ -57,10 +58,13 @@ class TickGrid(NamedTuple):
     interval: float  # s
     clock: ControllerClock | None  # of the controller, where the data tell it
 
-    def read(self, times: Array, values: Array, row: Signal, *, computed: bool) -> tuple[Array, bool]:
+    def read(
+        self, times: Array, values: Array, row: Signal, known: Array | None, *, computed: bool
+    ) -> tuple[Array, bool]:
         """What a channel (n,) with rows at times (n,), s, has at the ticks, and whether that lies between its rows.
 
-        A controller `computed` it, or it was read by a converter of the logger.
+        A controller `computed` it, or it was read by a converter of the logger. Where it is `known` (ticks,) what it
+        should be, that is followed between rows.
         """
         clock, places = self.clock, self.t
         if clock is not None:
@@ -68,11 +72,21 @@ class TickGrid(NamedTuple):
             if row.kind is FieldType.INDEX:
                 return clock.latest(times, values, self.t), not stands_on(times, places, self.interval)
             if computed and slow:
-                places, (times, values) = self.t, clock.seen(times, values)
-            elif not slow and clock.holds(times, values):
-                return clock.held(times, values, self.t), False
+                when, held = clock.seen(times, values)
+                return self.between(when, held, row, known), not stands_on(when, self.t, self.interval)
+            if not slow and clock.holds(times, values):
+                return self.between(*clock.held(times, values, self.t), row, known), False
         apart = not stands_on(times, places, self.interval)
         return (moved(times, values, places, row) if apart else values[nearest_rows(times, places)]), apart
+
+    def between(self, when: Array, values: Array, row: Signal, known: Array | None) -> Array:
+        """What a channel has at all ticks by its values (m,) at some of them, at `when` (m,), s."""
+        if when.size == self.t.size:
+            return values
+        if known is None or known.size < self.t.size:
+            return moved(when, values, self.t, row)
+        there = known[np.clip(np.rint(when / self.interval).astype(int), 0, self.t.size - 1)]
+        return known[: self.t.size] + moved(when, values - there, self.t, row)
 
 
 def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = False) -> OnTicks:
@@ -95,7 +109,7 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
         gaps, begin = missing_rows(theirs), float(theirs[0])
         theirs = theirs - begin
         t = np.arange(int(np.floor(theirs[-1] / interval + 1e-9)) + 1, dtype=np.float64) * interval
-    clock = None if mapping.static else clock_in(mapping, table, data, theirs, rows)
+    clock, ground = (None, None) if mapping.static else clock_in(mapping, table, data, theirs, rows)
     if clock is not None:  # and no tick after the last row
         t = np.arange(int(clock.places(theirs[-1:])[0] + ON_TICKS) + 1, dtype=np.float64) * interval
     ticks = TickGrid(t, interval, clock)
@@ -121,31 +135,36 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
         if unit:
             found.units[name] = unit
         times, values = theirs[own], scale * column[own] + source.offset
-        found.values[name], apart = ticks.read(times, values, row, computed=name in computed)
+        should = ground if name == GROUND else None
+        found.values[name], apart = ticks.read(times, values, row, should, computed=name in computed)
         found.stated[name] = channel(source, row, rate if own.all() else rate_of(times), between=apart)
     return found
 
 
 def clock_in(
     mapping: ImportMap, table: DataTable, data: Path, theirs: Array, rows: Any
-) -> ControllerClock | None:
-    """The clock of the controller by times (rows,) of the data, s; None where nothing tells it."""
+) -> tuple[ControllerClock | None, Array | None]:
+    """The clock of the controller by times (rows,) of the data, s, and the plan's ground (ticks,) where that tells it.
+
+    None where nothing tells it.
+    """
     interval = mapping.plan.test.interval
-    by_ground = None
+    by_ground = planned = None
     if (ground := recorded_ground(mapping, table, data, rows)) is not None:
         planned = planned_ground(mapping.plan, float(theirs[-1]))
         by_ground = None if planned is None else clock_by_ground(theirs, ground, planned, interval)
     found = clock_of(theirs, columns_of(mapping, table, data, rows), interval)
-    return found.beside(by_ground) if found and by_ground else found or by_ground
+    if by_ground is None:
+        return found, None
+    return (found.beside(by_ground) if found else by_ground), planned
 
 
 def recorded_ground(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> Array | None:
     """The ground acceleration (rows,) as a logger recorded a number of the controller, m/s²; None for any other."""
-    name = "ground_acceleration"
-    source = mapping.signals.get(name)
+    source = mapping.signals.get(GROUND)
     if source is None or source.value is not None or source.filter is not None or source.delay != 0.0:
         return None
-    scale, _ = scale_of(name, source, lab_signals(mapping.plan)[name][1], table, data)
+    scale, _ = scale_of(GROUND, source, lab_signals(mapping.plan)[GROUND][1], table, data)
     found: Array = scale * pick(table, source.column, data)[rows] + source.offset
     return found if np.isfinite(found).all() else None
 
