@@ -16,10 +16,9 @@ from common.plan import read as plans
 from common.recording.reader import read
 from simulation.workers.pool import spread
 from validation.blind.best import gaps, silent_run, without_noise
-from validation.blind.cases.case import Case, levels, reality
+from validation.blind.cases.case import Case, reality
 from validation.blind.cases.computed import strange
-from validation.blind.logger.loggers import LOGGERS
-from validation.blind.logger.relogging import relog
+from validation.blind.logger.log import log
 from validation.blind.oracle import separation
 from validation.blind.size import sizes
 from validation.blind.worker import OTHER
@@ -65,7 +64,7 @@ def record(case: Case, folder: Path) -> RecordedCase:
         play_other(case, path.with_suffix(OTHER))
     quiet = path.with_suffix(".true")
     if case.logger:
-        relog(played, path, plan, LOGGERS[case.logger], levels(case.truths), case.seed)
+        log(case, plan, played, path)
         silent = read(quiet)
     else:
         noiseless = reality(case, silent=True)

@@ -12,7 +12,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from validation.blind.labs.materials import MATERIALS
-from validation.blind.logger.loggers import LOGGERS
+from validation.blind.logger.loggers import IN_STEP, OUT_OF_STEP
 
 if TYPE_CHECKING:
     from validation.blind.lots import Lot
@@ -80,7 +80,13 @@ SETS = {
     "loggers": CaseSet(
         "clean laboratories and single effects through data loggers",
         turns=("clean", "catalogue"),
-        loggers=tuple(LOGGERS),
+        loggers=tuple(IN_STEP),
+    ),
+    "out_of_step": CaseSet(
+        "clean laboratories and single effects through imports of loggers with clocks of their own",
+        turns=("clean", "formula"),
+        loggers=tuple(OUT_OF_STEP),
+        own=True,
     ),
     "normal": CaseSet("true parameters normal about the nominal ones", normal=True),
     "many": CaseSet("up to nine mild faults at once", {"clean": 0.1, "many": 0.9}),

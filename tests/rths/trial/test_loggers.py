@@ -20,7 +20,7 @@ from validation.blind.best import silent_run
 from validation.blind.cases.basis import basis
 from validation.blind.draw import begin, draw
 from validation.blind.logger import logged
-from validation.blind.logger.loggers import LOGGERS, Logger
+from validation.blind.logger.loggers import IN_STEP, LOGGERS, Logger
 from validation.blind.record import record
 from validation.blind.results.rows import case_rows
 from validation.blind.results.stated import brier_skill
@@ -93,9 +93,9 @@ def test_a_logger_of_another_rate_keeps_the_signal_and_its_length() -> None:
 
 
 def test_cases_take_the_loggers_in_turn_and_kinds_in_rounds() -> None:
-    count, library = len(LOGGERS), basis().library
+    count, library = len(IN_STEP), basis().library
     begun = [begin(index, 5, "loggers", library) for index in range(2 * count)]
-    assert [SETS["loggers"].logger(item.lot) for item in begun] == 2 * list(LOGGERS)
+    assert [SETS["loggers"].logger(item.lot) for item in begun] == 2 * list(IN_STEP)
     assert {item.kind for item in begun[:count]} == {"clean"}
     assert {item.kind for item in begun[count:]} == {"catalogue"}
     assert not SETS["judge"].logger((5, "judge", 0))

@@ -26,7 +26,7 @@ from validation.blind.cases.case import Case, Laid
 from validation.blind.draw import begin, draw
 from validation.blind.labs import materials
 from validation.blind.labs.material_lab import material
-from validation.blind.logger.loggers import LOGGERS, Logger
+from validation.blind.logger.loggers import IN_STEP, LOGGERS, Logger
 from validation.blind.results.rows import case_rows
 from validation.blind.sets import MILD, SETS
 
@@ -188,6 +188,7 @@ def test_every_set_states_its_question() -> None:
         "judge",
         "tune",
         "loggers",
+        "out_of_step",
         "normal",
         "many",
         "independent",
@@ -195,4 +196,4 @@ def test_every_set_states_its_question() -> None:
         "unlisted_tune",
         "materials",
     }
-    assert len(LOGGERS) == 15
+    assert len(IN_STEP) == 15

@@ -54,6 +54,7 @@ class ColumnMemory(NamedTuple):
     approximation: Array  # of a dead time that is approximated
     specimen: Array
     filtered: Array  # of the readings
+    between: Array  # (steps, 2): readings at the ends of the steps of the last interval
     unlisted: EffectMemory
 
 
@@ -177,7 +178,7 @@ def advance(
 ) -> tuple[float, float]:
     """Displacement (m) and force (N) behind their filters one interval later, the command ramped."""
     state, past, approximation, filtered = memory.state, memory.past, memory.approximation, memory.filtered
-    held, added = memory.unlisted, memory.unlisted.added
+    held, added, between = memory.unlisted, memory.unlisted.added, memory.between
     start = state[COMMAND]
     back = p.delay / p.step
     displacement, force = 0.0, 0.0
@@ -206,5 +207,6 @@ def advance(
         state[PISTON], state[DEFORMATION] = piston, deformation
         displacement = filters.step_filter(lags[0], filtered[0], deformation, p.step)
         force = filters.step_filter(lags[1], filtered[1], state[READING], p.step)
+        between[i, 0], between[i, 1] = displacement, force
     state[COMMAND] = command
     return displacement, force

@@ -17,6 +17,7 @@ from validation.blind.labs import column_kernel, laying, sensors
 from validation.blind.labs.column_effects import KNOWN
 from validation.blind.labs.column_kernel import ColumnMemory, Servo
 from validation.blind.labs.parts import delay, filters, specimen
+from validation.blind.labs.parts.compiled import Array
 from validation.blind.labs.parts.specimen import TrueSpecimen
 from validation.blind.labs.unlisted import actuator as actuator_effects
 from validation.blind.labs.unlisted.effect import at_rest
@@ -55,6 +56,7 @@ class TrueColumnLab:
             np.zeros(3),
             np.zeros(specimen.SIZE),
             np.zeros((len(SIGNALS), 3)),
+            np.zeros((steps, len(SIGNALS))),
             at_rest(values, actuator_effects.SEEN, actuator_effects.ADDED),
         )
         self._true: tuple[float, ...] = (0.0, 0.0)
@@ -75,6 +77,10 @@ class TrueColumnLab:
             self._memory,
             float(command[0]),
         )
+
+    def between(self) -> Array:
+        """Readings (steps, signals) at the ends of the short steps of the last interval."""
+        return self._sensors.between(self._memory.between)
 
     def disarm(self) -> None:
         """The actuator stays where it is."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from models.registry import Array
 from validation.blind.labs.laying import PLAIN, KnownEffect, Values
 from validation.blind.labs.unlisted import readings
 
@@ -165,7 +166,20 @@ class TrueSensors:
         self._noise = np.random.default_rng(seed)
         self._block: list[list[float]] = []
         self._interval, self._tick = interval, 0
+        self._made_of = (tuple(names), dict(values), seed)
+        self._quick: TrueSensors | None = None
         self.lags = {name: (values[f"{name}.order"], values[f"{name}.lag"]) for name in names}
+
+    def between(self, rows: Array) -> Array:
+        """Readings of true values (steps, signals) within an interval, by the same sensors that are read so often.
+
+        It is asked for after every interval from the first one, which begins at rest, or never.
+        """
+        if self._quick is None:
+            names, values, seed = self._made_of
+            self._quick = TrueSensors(names, values, self._interval / len(rows), seed)
+            self._quick.read([0.0] * len(names))
+        return np.array([list(self._quick.read(row)) for row in rows.tolist()])
 
     def read(self, true: Sequence[float]) -> Iterable[float]:
         """Readings at the present tick."""

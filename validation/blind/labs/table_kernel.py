@@ -44,6 +44,7 @@ class TableMemory(NamedTuple):
     approximation: Array  # of a dead time that is approximated
     work: Array  # (6, MOVING): rates, and room for the readings
     filtered: Array  # of the readings
+    between: Array  # (steps, 4): readings at the ends of the steps of the last interval
     unlisted: EffectMemory
 
 
@@ -293,5 +294,6 @@ def advance(
             look(p, state, work[0], memory.unlisted, late, push)
         for k in range(4):
             out[k] = filters.step_filter(lags[k], filtered[k], out[k], p.step)
+            memory.between[i, k] = out[k]
     state[COMMAND] = command
     return out[DISPLACEMENT], out[ACCELERATION], out[STROKE_OUT], out[FORCE]

@@ -16,6 +16,7 @@ from common.rig import TableCommand, TableMeasurement
 from validation.blind.labs import laying, table_kernel
 from validation.blind.labs.column_lab import STEP, readings
 from validation.blind.labs.parts import delay
+from validation.blind.labs.parts.compiled import Array
 from validation.blind.labs.table_effects import KNOWN
 from validation.blind.labs.table_kernel import TableMemory, TrueTable
 from validation.blind.labs.unlisted import table as table_effects
@@ -53,6 +54,7 @@ class TrueTableLab:
             np.zeros(3),
             np.zeros((6, table_kernel.MOVING)),
             np.zeros((len(SIGNALS), 3)),
+            np.zeros((steps, len(SIGNALS))),
             at_rest(values, table_effects.SEEN, table_effects.ADDED),
         )
         self._true: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
@@ -73,6 +75,10 @@ class TrueTableLab:
             float(command[0]),
             float(command[1]),
         )
+
+    def between(self) -> Array:
+        """Readings (steps, signals) at the ends of the short steps of the last interval."""
+        return self._sensors.between(self._memory.between)
 
     def disarm(self) -> None:
         """The table stays where it is; the motor's force is its command's."""

@@ -17,10 +17,9 @@ from models.ground_motion.motions import MOTIONS
 from models.registry import Array
 from validation.blind import lots
 from validation.blind.cases.basis import TrialBasis, log_uniform
-from validation.blind.cases.case import Case, levels, reality
+from validation.blind.cases.case import Case, reality
 from validation.blind.cases.computed import strange
-from validation.blind.logger.loggers import LOGGERS
-from validation.blind.logger.relogging import relog
+from validation.blind.logger.log import log
 from validation.blind.oracle import RANDOM
 
 Readings = Mapping[str, Mapping[str, Array]]  # by role and name
@@ -77,7 +76,7 @@ def play(following: FollowingTest, folder: Path) -> PlayedTest:
     stopped = driven(case, played, without_noise=False)
     if case.logger:
         plan = plans.from_tables(case.plan, Path())
-        relog(played, path, plan, LOGGERS[case.logger], levels(case.truths), case.seed)
+        log(case, plan, played, path)
         played.unlink()
     plays = PLAYS if any(item.name in BY_CHANCE for item in case.laid) else 1
     silent = [silently(replace(case, seed=case.seed + place), folder) for place in range(plays)]
