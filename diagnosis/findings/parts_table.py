@@ -12,8 +12,8 @@ from diagnosis.findings.sensors.noise_levels import noise_rms
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.residuals import Data
+from diagnosis.recorded.building.logged_building import BALANCE
 from diagnosis.recorded.column_alone import ColumnAlone
-from diagnosis.recorded.logged_building import BALANCE
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import NoiseEntry, PartOfGap

@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 from diagnosis.fits.hypothesis import Problem, Values, lay
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.threads import each
-from diagnosis.recorded.parts import Building
+from diagnosis.recorded.building.building import Building
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 

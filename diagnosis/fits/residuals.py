@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from common.errors import InputError
-from diagnosis.recorded.logged_building import LoggedBuilding
+from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, Part
 from diagnosis.recorded.record import Record
 from diagnosis.signals import colour

@@ -19,9 +19,9 @@ import numpy as np
 from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
+from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.joined import JoinedPart
-from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.signals import colour, pickup
 from diagnosis.signals.mask import Mask

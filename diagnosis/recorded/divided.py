@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from common.plan.kinds import COLUMN
+from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.missing_rows import with_known_commands
-from diagnosis.recorded.parts import Building, LaboratoryPart, Part
+from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.recorded.record import Record
 
 BUILDING = ("ground_acceleration", "displacement")

@@ -14,8 +14,6 @@ import numpy as np
 
 from common.plan.kinds import COLUMN
 from common.plan.plan import Plan
-from common.recording.imported import ImportedData
-from common.roles import MASTER
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import (
     BETWEEN,
@@ -26,7 +24,6 @@ from diagnosis.recorded.nuisances import (
     channels,
     nothing_stated,
     nuisances,
-    of_building,
     of_filters,
     of_logger,
     through_logger,
@@ -36,7 +33,7 @@ from diagnosis.signals import pieces
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
 from laboratories.kind import Machine
-from laboratories.kinds import KINDS, kind_of
+from laboratories.kinds import KINDS
 from loop import replay
 from models.registry import Array
 from models.system import System
@@ -324,76 +321,3 @@ class LaboratoryPart:
     def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""
         return with_fields(self, fields)
-
-
-class Building(Measured):
-    """The numerical substructure from the ground motion and the forces that the master used.
-
-    It is exact where the recorded forces are the very numbers that the master used; otherwise a logger recorded them.
-    """
-
-    name = "structure"
-    role = MASTER
-    exact = True
-    signals: tuple[str, ...] = ("displacement", "velocity", "acceleration")
-
-    def __init__(self, record: Record) -> None:
-        plan, none = record.plans[MASTER], np.zeros(record.ticks)
-        own, other = record.own, record.other
-        if record.whole is not None:
-            used = record.whole.used
-            came = [kind_of(plan, role).channels.used for role in plan.roles]
-        elif other is not None:
-            used, came = record.signals[other.kind.channels.used][:, None], [other.kind.channels.used]
-        else:
-            used, came = np.zeros((record.ticks, 0)), []
-        names = (own.kind.channels.position, own.kind.channels.force) if own else ()
-        read = [record.signals[name] for name in names] or [none, none]
-        self._inputs = (read[0], read[1], used)
-        self._force = own.kind.channels.force if own else ""
-        self.sources = (self._force, *came) if own else ()  # forces used, the own laboratory's first
-        self.linear = plan.structure.columns.model == "linear"
-        self._plan, self.whole = plan, record.has(*type(self).signals)
-        self._scale = own.kind.coupling(own.plan).scale if own else 1.0
-        self._interval = record.plan.test.interval
-        here = record.signals["ground_acceleration"]
-        self._ground = np.zeros((2, record.ticks + 1))
-        self._ground[0, :-1] = here
-        storeys = plan.storeys
-        self.signals = tuple(name for name in type(self).signals for _ in range(storeys))
-        columns = [
-            record.signals[name].reshape(record.ticks, -1)[:, i]
-            for name in ("displacement", "velocity", "acceleration")
-            for i in range(storeys)
-        ]
-        self.measured = np.stack(columns, axis=1)
-        self.present = np.repeat(record.present["displacement"][:, None], self.measured.shape[1], axis=1)
-        stated = record.stated or ImportedData("")
-        seen = (*self.signals, "ground_acceleration", self._force, *came)  # motion, ground and forces
-        self.channels = tuple(stated.channel(MASTER, name) for name in seen)
-        self._stated = stated.channel(MASTER, self._force)
-        self.nuisances = of_building(plan)
-        self.candidates = of_sites(record, ("structure",), plan)
-
-    def predict(self, system: System) -> Array:
-        """Displacement, velocity and acceleration of every storey."""
-        rows = replay.building(system, self._ground, *self.forces(system))
-        return np.column_stack([rows[name] for name in type(self).signals])
-
-    @property
-    def treated(self) -> bool:
-        """Whether filters or delays of a logger differ between its motion, the ground's and the forces."""
-        return len({(one.filter, one.delay) for one in self.channels}) > 1
-
-    @property
-    def ground(self) -> Array:
-        """Ground acceleration (ticks,)."""
-        return self._ground[0, :-1]
-
-    def forces(self, system: System) -> tuple[Array, Array, Array]:
-        """Position and force of the master's laboratory and the forces of the others, as the master used them."""
-        return self._inputs
-
-    def first(self, ticks: int) -> Building:
-        """The whole of it, because it is computed and cheap."""
-        return self

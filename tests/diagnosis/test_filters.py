@@ -16,9 +16,9 @@ from common.roles import MASTER
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged import filters, logger
 from diagnosis.fits import fitting, residuals, settling, worth
-from diagnosis.recorded import logged_building
+from diagnosis.recorded.building import logged_building
+from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.divided import parts_of
-from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import NOT_LATE, Record
 from diagnosis.signals import low_pass
 from diagnosis.signals.strength import BEYOND

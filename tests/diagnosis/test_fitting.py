@@ -20,8 +20,9 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import secant
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded import record
+from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.nuisances import of_building
-from diagnosis.recorded.parts import MODEL_ERROR, Building, LaboratoryPart, Part
+from diagnosis.recorded.parts import MODEL_ERROR, LaboratoryPart, Part
 from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE
 from models.registry import Array

@@ -15,9 +15,9 @@ from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search
+from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.distinct import refuse_copies
 from diagnosis.recorded.joined import JoinedPart, joined, refuse_others
-from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Record
 from models.system import System
 from tests.diagnosis.cases import Cases, lab_a, lab_b

@@ -23,12 +23,12 @@ from diagnosis.fits import fitting, hypothesis, residuals, settling, worth
 from diagnosis.fits.residuals import over_longer
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
-from diagnosis.recorded import logged_building
+from diagnosis.recorded.building import logged_building
+from diagnosis.recorded.building.building import Building
+from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.recorded.ground import Ground
-from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.loop import RecordedLoop
 from diagnosis.recorded.nuisances import CALIBRATED
-from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import Delay, Late, Record
 from diagnosis.report.records import HowFar
 from diagnosis.signals import alike
@@ -49,7 +49,6 @@ def relogged(whole: Record, name: str, values: Array) -> Record:
 def logged(whole: Record) -> residuals.Data:
     """The building of a record as a part that is judged by its balance of forces."""
     part = logged_building.logged(Building(whole))
-    assert part is not None
     return residuals.prepare(part, whole)
 
 

@@ -21,7 +21,8 @@ from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search
-from diagnosis.recorded.parts import Building, LaboratoryPart
+from diagnosis.recorded.building.building import Building
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE, checked, lay
 from models.registry import Array

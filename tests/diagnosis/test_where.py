@@ -19,7 +19,8 @@ from diagnosis.findings.where import SiteTrace
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search
-from diagnosis.recorded.parts import Building, Part
+from diagnosis.recorded.building.building import Building
+from diagnosis.recorded.parts import Part
 from diagnosis.recorded.record import NOT_LATE, Record
 from laboratories.effects import CATALOGUE, checked, lay
 from models.registry import Array

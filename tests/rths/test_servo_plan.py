@@ -15,7 +15,7 @@ from common.reality import reality
 from common.recording.reader import read
 from common.recording.run import Run
 from diagnosis.recorded import record
-from diagnosis.recorded.parts import Building
+from diagnosis.recorded.building.building import Building
 from loop import closed_loop, substructure
 from loop.signals import signals
 from models.system import System

@@ -12,8 +12,9 @@ from diagnosis.fits import fitting, residuals
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
-from diagnosis.recorded.logged_building import LoggedBuilding, logged
-from diagnosis.recorded.parts import Building, Part
+from diagnosis.recorded.building.building import Building
+from diagnosis.recorded.building.logged_building import LoggedBuilding, logged
+from diagnosis.recorded.parts import Part
 from diagnosis.recorded.record import Record
 
 # Ratio of the noise in a balance of forces to that of the forces used, from which on a logger caused it.

@@ -17,10 +17,11 @@ import numpy as np
 
 from common.recording.imported import NOTHING_STATED, ImportedChannel, LoggerFilter
 from common.roles import MASTER
+from diagnosis.recorded.building.building import Building
+from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.recorded.divided import parts_of
-from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.nuisances import ALIKE
-from diagnosis.recorded.parts import Building, LaboratoryPart, Part
+from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Delay, Late, Record
 from diagnosis.signals import low_pass
 from diagnosis.signals.low_pass import ReadSpectra

@@ -15,9 +15,9 @@ from diagnosis.findings.sensors import readings
 from diagnosis.findings.verdict import UNNAMED, PartVerdict
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
+from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
-from diagnosis.recorded.logged_building import LoggedBuilding
 from diagnosis.recorded.nuisances import ALIKE, LATE
 from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, NOT_LATE, Delay, Late, Record

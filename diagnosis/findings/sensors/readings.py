@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.fits.residuals import STEPPING, Data
-from diagnosis.recorded.parts import Building
+from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import quantum, quantum_between
 from models.registry import Array

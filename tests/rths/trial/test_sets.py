@@ -26,7 +26,7 @@ from validation.blind.cases.case import Case, Laid
 from validation.blind.draw import begin, draw
 from validation.blind.labs import materials
 from validation.blind.labs.material_lab import material
-from validation.blind.logger.loggers import IN_STEP, LOGGERS, Logger
+from validation.blind.logger.loggers import IN_STEP, Logger
 from validation.blind.results.rows import case_rows
 from validation.blind.sets import MILD, SETS
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.nuisances import ALIKE, CALIBRATED, LATE, UNLIKE, LoggedForce
-from diagnosis.recorded.parts import Building
 from diagnosis.recorded.record import LEAST_TICKS, Delay
 from diagnosis.signals import alike, low_pass
 from diagnosis.signals.earlier import earlier
@@ -23,14 +23,12 @@ BALANCE = "force_balance"  # signal of a building that is judged by the balance 
 SURE = 3.0  # standard deviations from which on a stated filter is taken to lie before the master
 
 
-def logged(building: Building) -> LoggedBuilding | None:
-    """The same building, of which the forces used are known up to a logger's noise; None without its motion.
+def logged(building: Building) -> LoggedBuilding:
+    """The same building, of which the forces used are known up to a logger's noise.
 
     What was recorded lies behind the filters and delays that are stated for it, unless these lie before the master too,
     so that what was recorded is what it used.
     """
-    if not building.whole:
-        return None
     plain = LoggedBuilding(building)
     if not (building.linear and building.treated):
         return plain
@@ -68,7 +66,7 @@ class LoggedBuilding(Building):
 
     def __init__(self, of: Building, *, behind: bool = False) -> None:
         self.__dict__.update(of.__dict__)
-        self.motion, self.behind = of.measured, behind
+        self.behind = behind
         if behind:
             self.pass_alike()
         plan = self._plan
@@ -154,7 +152,7 @@ class LoggedBuilding(Building):
         What it leaves is at the time and in the unit of the reading, so that neither delay nor gain changes its noise.
         """
         delay, gain = self.logger(system)
-        apart = self.balance(system, self.motion - super().predict(system))
+        apart = self.balance(system, self.motion - self.computed(system))
         return self.measured - gain * earlier(apart, -delay / self._interval)
 
     def forces(self, system: System) -> tuple[Array, Array, Array]:

@@ -1,0 +1,1 @@
+"""The building of a test: as the master computed it, and as one whose forces a data logger recorded."""
