@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
+from common.roles import MASTER, SLAVE, kind_of
 
 if TYPE_CHECKING:
     from common.recording.run import Run
@@ -227,11 +228,13 @@ def later(values: Samples, ticks: float) -> Samples:
 def logged_alone(run: Run) -> bool:
     """Whether a logger recorded a laboratory without the test around it, command and reading of a moment in one row.
 
-    A command is reached in its row then, while rths writes one that is reached at the end of its interval.
+    A command is reached in its row then, while rths writes one that is reached at the end of its interval. So do the
+    controllers of a test, of which a recording shows the building's motion, or signals of master and slave.
     """
     stated = imported(run)
-    inside = any("displacement" in columns for columns in run.columns.values())
-    return stated is not None and not stated.static and not inside
+    topics = [topic for topic in run.columns if kind_of(topic) in (MASTER, SLAVE)]
+    around = len(topics) > 1 or any("displacement" in columns for columns in run.columns.values())
+    return stated is not None and not stated.static and not around
 
 
 def exchange_known(run: Run) -> bool:
