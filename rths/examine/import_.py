@@ -105,6 +105,7 @@ def show(
             "link": "judged" if judged else UNJUDGED,
             "units": found.units,
             "gaps": found.gaps,
+            "ends": found.ends,
             "ground_unread": unread,
             "text": form and form._asdict(),
         }
@@ -125,6 +126,11 @@ def show(
         say(f"interpolated onto the ticks, and marked so: {', '.join(found.interpolated)}\n")
     if found.clock and found.clock.between:
         say(f"{found.clock.told}\n")
+    if any(found.ends):
+        before, behind = found.ends
+        say(
+            f"left out, as not all columns have begun or go on there: {before} rows at the begin, {behind} at the end\n"
+        )
     if found.gaps:
         begin, end = max(found.gaps, key=lambda gap: gap[1] - gap[0])
         more = f", and in {len(found.gaps) - 1} shorter gaps" if found.gaps[1:] else ""

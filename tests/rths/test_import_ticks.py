@@ -134,6 +134,17 @@ def test_a_channel_with_a_rate_of_its_own_has_empty_cells(bring: Any, case: str)
     assert [one.rate for one in channels] == pytest.approx([rate, 100.0])
 
 
+def test_rows_where_one_of_two_loggers_has_not_begun_or_has_ended_are_left_out(
+    bring: Any, capsys: Any
+) -> None:
+    times = np.unique(np.r_[TIMES, SLOW])
+    motion = 5.0 * np.sin(2.0 * np.pi * 0.7 * times)
+    read, commanded = (np.where(np.isin(times, those), motion, np.nan) for those in (SLOW[2:-2], TIMES))
+    assert bring(table("t,u,y", times, commanded, read).replace("nan", ""), DRIVE)[0] == 0
+    said = capsys.readouterr().out
+    assert "left out, as not all columns have begun or go on there: 9 rows at the begin, 8 at the end" in said
+
+
 @pytest.mark.parametrize("holes", [slice(200, 201), slice(200, 260), slice(0, 30), slice(380, None)])
 def test_a_channel_with_a_hole_is_refused(bring: Any, capsys: Any, holes: slice) -> None:
     read = LATE.copy()

@@ -13,23 +13,29 @@ import numpy.typing as npt
 from common.errors import InputError, PlanError
 from common.plan.plan import Plan
 from common.plan.read import with_test
-from common.plan.schema import nearest
 from common.recording.imported import ImportedChannel
 from common.roles import MASTER
-from common.signals import TIME, FieldType, Signal
+from common.signals import FieldType, Signal
 from models.registry import Array
 from report.text.tabular import DataTable
 from rths.examine.importing.controller_clock import ControllerClock, clock_by_ground, clock_of
 from rths.examine.importing.import_map import ImportMap, SignalSource, in_unit, lab_signals
+from rths.examine.importing.time_base import (
+    EVENLY,
+    FOR_A_SPLINE,
+    outside,
+    pick,
+    time_base,
+    time_unit,
+    without_ends,
+)
 
 GROUND = "ground_acceleration"  # the signal that the plan knows as well
 # Distance of rows over the plan's interval, and the plan's interval over it, from which on the time has another unit:
 # milliseconds for seconds make 1000, while minutes make 60 and an oscilloscope has a hundred rows in an interval.
 FAR_APART, TOO_CLOSE = 90.0, 900.0
 GAP = 4.5  # usual distances of rows from which on rows are missing between two: more than three of them
-FOR_A_SPLINE = 4  # rows at least
 FAST = 1.03  # rows in an interval, from which on they show whether a channel holds its value
-EVENLY = 1.5  # usual distances of a channel's own rows, from which on one is missing
 ON_TICKS = 1e-3  # of an interval, within which a row is on its tick: times in a text file are rounded to a microsecond
 
 
@@ -44,6 +50,10 @@ class OnTicks:
     begin: float = 0.0  # s, the time of the first row in the data
     gaps: tuple[tuple[float, float], ...] = ()  # s in the data's own time, between which rows are missing
     clock: ControllerClock | None = None  # of the controller, where what it holds tells it
+    ends: tuple[int, int] = (
+        0,
+        0,
+    )  # rows before the first and behind the last one in which every column began and ends
 
     @property
     def interpolated(self) -> list[str]:
@@ -97,6 +107,8 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
             unless `as_is`, has another unit.
     """
     theirs, rows = time_base(mapping, table, data)
+    ends = (0, 0) if mapping.static else outside(mapping, table, data, theirs, rows)
+    theirs, rows = without_ends(theirs, rows, *ends)
     interval = mapping.plan.test.interval
     gaps: tuple[tuple[float, float], ...] = ()
     begin = 0.0
@@ -115,7 +127,7 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
     ticks = TickGrid(t, interval, clock)
     rate = 0.0 if mapping.static else rate_of(theirs)
     known, computed = lab_signals(mapping.plan), of_controller(mapping.plan)
-    found = OnTicks(t, {}, {}, {}, begin, gaps, clock)
+    found = OnTicks(t, {}, {}, {}, begin, gaps, clock, ends)
     if mapping.time and not mapping.time_unit and time_unit(mapping, table) not in ("", "s"):
         found.units["time"] = time_unit(mapping, table)
     for name, source in mapping.signals.items():
@@ -306,65 +318,3 @@ def channel(source: SignalSource, row: Signal, rate: float, *, between: bool) ->
         interpolated=between and not counted,
         rate=rate,
     )
-
-
-def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, Any]:
-    """Times of the rows that are read, s, and which rows those are; raises InputError where they do not increase."""
-    counted = np.arange(length(mapping, table, data), dtype=np.float64) / (mapping.rate or 1.0)
-    t = seconds(mapping, table, data) if mapping.time else counted
-    bad = np.flatnonzero(~(np.diff(t) > 0.0))
-    if not mapping.static and (bad.size or t.size < 2):
-        row = int(bad[0]) + 2 if bad.size else t.size
-        raise InputError(f"{data}: the time in column '{mapping.time}' does not increase at row {row}.")
-    rows = np.ones(t.size, dtype=bool)
-    if mapping.start is not None:
-        rows &= t >= mapping.start
-    if mapping.stop is not None:
-        rows &= t <= mapping.stop
-    if np.count_nonzero(rows) < 2:
-        raise InputError(
-            f"{data}: fewer than two rows lie between start and stop; its times go from {t[0]:g} to {t[-1]:g} s."
-        )
-    return t[rows], rows
-
-
-def seconds(mapping: ImportMap, table: DataTable, data: Path) -> Array:
-    """The column of the time, s."""
-    t = pick(table, mapping.time, data)
-    unit = time_unit(mapping, table)
-    try:
-        return t * in_unit(unit, TIME, "time") if unit else t
-    except PlanError as error:
-        raise InputError(f"{mapping.path}: {str(error).replace(' in [signals]', '')}") from None
-
-
-def time_unit(mapping: ImportMap, table: DataTable) -> str:
-    """The map's unit of the time, else that in the row below its name; empty for seconds.
-
-    What stands there may be a word such as sec, or a format. That it is not in seconds
-    then shows in how far rows are apart.
-    """
-    stated = mapping.time_unit
-    unit = stated or table.units.get(mapping.time, "")
-    try:
-        in_unit(unit or "s", TIME, "time")
-    except PlanError:
-        return stated
-    return unit
-
-
-def length(mapping: ImportMap, table: DataTable, data: Path) -> int:
-    """How many rows the columns of the map have; raises InputError where they differ."""
-    names = [*([mapping.time] if mapping.time else []), *(row.column for row in mapping.signals.values())]
-    sizes = {name: pick(table, name, data).size for name in names if name}
-    if len(set(sizes.values())) > 1:
-        counts = ", ".join(f"'{name}' has {size}" for name, size in sizes.items())
-        raise InputError(f"{data}: the columns of the map have different numbers of rows: {counts}.")
-    return next(iter(sizes.values()), 0)
-
-
-def pick(table: DataTable, name: str, data: Path) -> Array:
-    """A column by name; raises InputError with the nearest name where there is none."""
-    if name not in table.columns:
-        raise InputError(f"{data} has no numeric column '{name}': {nearest(name, table.columns)}")
-    return table.columns[name]

@@ -1,0 +1,114 @@
+"""The time base of a data file: which of its rows are read, and when they were taken."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from common.errors import InputError, PlanError
+from common.plan.schema import nearest
+from common.signals import TIME
+from models.registry import Array
+from report.text.tabular import DataTable
+from rths.examine.importing.import_map import ImportMap, in_unit
+
+ENDS = 0.02  # share of the rows that may come before a column begins, or behind its end
+FOR_A_SPLINE = 4  # rows at least
+EVENLY = 1.5  # usual distances of a channel's own rows, from which on one is missing
+
+
+def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, Any]:
+    """Times of the rows that are read, s, and which rows those are; raises InputError where they do not increase."""
+    counted = np.arange(length(mapping, table, data), dtype=np.float64) / (mapping.rate or 1.0)
+    t = seconds(mapping, table, data) if mapping.time else counted
+    bad = np.flatnonzero(~(np.diff(t) > 0.0))
+    if not mapping.static and (bad.size or t.size < 2):
+        row = int(bad[0]) + 2 if bad.size else t.size
+        raise InputError(f"{data}: the time in column '{mapping.time}' does not increase at row {row}.")
+    rows = np.ones(t.size, dtype=bool)
+    if mapping.start is not None:
+        rows &= t >= mapping.start
+    if mapping.stop is not None:
+        rows &= t <= mapping.stop
+    if np.count_nonzero(rows) < 2:
+        raise InputError(
+            f"{data}: fewer than two rows lie between start and stop; its times go from {t[0]:g} to {t[-1]:g} s."
+        )
+    return t[rows], rows
+
+
+def outside(
+    mapping: ImportMap, table: DataTable, data: Path, theirs: Array, rows: npt.NDArray[np.bool_]
+) -> tuple[int, int]:
+    """How many rows at both ends, with times (n,) s, come before a column of the map begins, or behind its end.
+
+    Loggers that stand in one file rarely begin and end together. More than a few rows are a hole.
+    """
+    before = behind = 0
+    for source in mapping.signals.values():
+        if source.value is None:
+            there = np.flatnonzero(np.isfinite(pick(table, source.column, data)[rows]))
+            if there.size < FOR_A_SPLINE:
+                continue
+            usual = EVENLY * float(np.median(np.diff(theirs[there])))
+            if theirs[there[0]] - theirs[0] >= usual:
+                before = max(before, int(there[0]))
+            if theirs[-1] - theirs[there[-1]] >= usual:
+                behind = max(behind, theirs.size - 1 - int(there[-1]))
+    most = ENDS * theirs.size
+    return (before if before <= most else 0), (behind if behind <= most else 0)
+
+
+def without_ends(
+    theirs: Array, rows: npt.NDArray[np.bool_], before: int, behind: int
+) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Times (n,) and the rows that have them, without some at both ends."""
+    kept, places = rows.copy(), np.flatnonzero(rows)
+    kept[places[:before]] = False
+    kept[places[places.size - behind :]] = False
+    return theirs[before : theirs.size - behind], kept
+
+
+def seconds(mapping: ImportMap, table: DataTable, data: Path) -> Array:
+    """The column of the time, s."""
+    t = pick(table, mapping.time, data)
+    unit = time_unit(mapping, table)
+    try:
+        return t * in_unit(unit, TIME, "time") if unit else t
+    except PlanError as error:
+        raise InputError(f"{mapping.path}: {str(error).replace(' in [signals]', '')}") from None
+
+
+def time_unit(mapping: ImportMap, table: DataTable) -> str:
+    """The map's unit of the time, else that in the row below its name; empty for seconds.
+
+    What stands there may be a word such as sec, or a format. That it is not in seconds
+    then shows in how far rows are apart.
+    """
+    stated = mapping.time_unit
+    unit = stated or table.units.get(mapping.time, "")
+    try:
+        in_unit(unit or "s", TIME, "time")
+    except PlanError:
+        return stated
+    return unit
+
+
+def length(mapping: ImportMap, table: DataTable, data: Path) -> int:
+    """How many rows the columns of the map have; raises InputError where they differ."""
+    names = [*([mapping.time] if mapping.time else []), *(row.column for row in mapping.signals.values())]
+    sizes = {name: pick(table, name, data).size for name in names if name}
+    if len(set(sizes.values())) > 1:
+        counts = ", ".join(f"'{name}' has {size}" for name, size in sizes.items())
+        raise InputError(f"{data}: the columns of the map have different numbers of rows: {counts}.")
+    return next(iter(sizes.values()), 0)
+
+
+def pick(table: DataTable, name: str, data: Path) -> Array:
+    """A column by name; raises InputError with the nearest name where there is none."""
+    if name not in table.columns:
+        raise InputError(f"{data} has no numeric column '{name}': {nearest(name, table.columns)}")
+    return table.columns[name]
