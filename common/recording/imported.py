@@ -107,6 +107,17 @@ class ImportedChannel:
     interpolated: bool = False  # whether its samples were interpolated to the ticks
     rate: float = 0.0  # sampling rate of the data, Hz; 0 where times have no meaning
     known: bool = False  # whether it was given as a constant rather than measured
+    first: float = 0.0  # s after the first tick, of the first of its samples that were interpolated
+
+    @property
+    def between(self) -> bool:
+        """Whether its samples lie between ticks, and show what a reading does there."""
+        return self.interpolated and self.rate > 0.0 and self.filter is None
+
+    def samples(self, ticks: int, interval: float) -> Samples:
+        """When the samples that were interpolated at `ticks` were taken, in ticks."""
+        count = int((ticks - 1 - self.first / interval) * interval * self.rate) + 1
+        return np.asarray((self.first + np.arange(count) / self.rate) / interval)
 
     @property
     def passes(self) -> float:

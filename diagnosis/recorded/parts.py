@@ -22,6 +22,8 @@ from diagnosis.recorded.nuisances import (
     Nuisance,
     calibrations,
     channels,
+    interpolated,
+    lateness,
     nothing_stated,
     nuisances,
     of_filters,
@@ -91,7 +93,7 @@ def cut(part: Any, ticks: int, inputs: Any) -> Any:
 def with_fields(part: Any, fields: dict[str, Any]) -> Any:
     """A copy of a part with some of its fields replaced, which has not played any system yet."""
     result = copy.copy(part)
-    for name, value in ({"played": (), "curved": None} | fields).items():
+    for name, value in ({"played": (), "curved": None, "misses": {}} | fields).items():
         setattr(result, name, value)
     return result
 
@@ -149,6 +151,7 @@ class LaboratoryPart:
         seen = [machine for machine in machines if self.shows(record, machine)]
         names = tuple(name for machine in seen for name in machine.parameters)
         self.channels = channels(record.stated, lab)
+        self.misses: dict[tuple[float | None, ...], Array] = {}  # what `missed` gives
         self.retimed = record.retimed or any(channel.interpolated for channel in self.channels)
         self.free = nothing_stated(record.mapped, lab)
         self.built_in = lab.kind.name in KINDS  # a user's kind has steps of its own within an interval
@@ -204,9 +207,21 @@ class LaboratoryPart:
         drive += [none] * (2 - len(drive))
         found = replay.read(self.lab.kind, system, self.motion(system.unread, drive))
         found = through_logger(found, self.lab, system, self.channels, drive if self.steps == 0 else [])
+        if self.steps == 0 and any(channel.between for channel in self.channels):
+            found = found + self.missed(lateness(self.lab, system, self.channels), drive)
         if self.freed >= 0:
             found[:, self.freed] += self.begun_elsewhere(self.measured[:, self.freed] - found[:, self.freed])
         return found
+
+    def missed(self, late: tuple[float | None, ...], drive: list[Array]) -> Array:
+        """What an interpolation misses of readings that are `late`, (ticks, channels), by the plan's laboratory.
+
+        That depends on what a fit moves in the second order only.
+        """
+        if late not in self.misses:
+            rows = np.stack(drive, axis=1)
+            self.misses[late] = interpolated(self.lab, System(self.lab.plan), rows, self.channels, late)
+        return self.misses[late]
 
     @property
     def passes(self) -> Array:

@@ -149,7 +149,10 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
         times, values = theirs[own], scale * column[own] + source.offset
         should = ground if name == GROUND else None
         found.values[name], apart = ticks.read(times, values, row, should, computed=name in computed)
-        found.stated[name] = channel(source, row, rate if own.all() else rate_of(times), between=apart)
+        begin_, fast = (clock.begin, clock.fast) if clock else (0.0, 0.0)
+        own_rate = (1.0 + fast) * (rate if own.all() else rate_of(times))
+        first = 0.0 if mapping.static else (float(times[0]) - begin_) / (1.0 + fast)
+        found.stated[name] = channel(source, row, own_rate, first, between=apart)
     return found
 
 
@@ -306,8 +309,10 @@ def scale_of(name: str, source: SignalSource, row: Signal, table: DataTable, dat
         raise InputError(f"{data}: {error} Or give its scale in the map.") from None
 
 
-def channel(source: SignalSource, row: Signal, rate: float, *, between: bool) -> ImportedChannel:
-    """The stated properties of the channel of a measured signal."""
+def channel(
+    source: SignalSource, row: Signal, rate: float, first: float, *, between: bool
+) -> ImportedChannel:
+    """The stated properties of the channel of a measured signal; `rate` (Hz) and `first` (s) are by the controller."""
     counted = row.kind is FieldType.INDEX
     return ImportedChannel(
         source.filter,
@@ -317,4 +322,5 @@ def channel(source: SignalSource, row: Signal, rate: float, *, between: bool) ->
         source.high_pass,
         interpolated=between and not counted,
         rate=rate,
+        first=first if between and not counted else 0.0,
     )
