@@ -96,8 +96,11 @@ class ControllerClock(NamedTuple):
 
     def seen(self, times: Array, values: Array) -> tuple[Array, Array]:
         """The ticks (m,), s by the controller, whose values (m,) were in force at times (n,) of the logger, s."""
-        on_tick = 0.0 if self.between else ON_TICK
-        ticks, rows = np.unique(np.floor(self.places(times) + on_tick), return_index=True)
+        on_tick, places = 0.0 if self.between else ON_TICK, self.places(times)
+        at_ticks = bool(np.all(np.abs(places - np.rint(places)) < ROUNDED))
+        ticks, rows = np.unique(
+            np.rint(places) if at_ticks else np.floor(places + on_tick), return_index=True
+        )
         return self.interval * ticks, values[rows]
 
     def latest(self, times: Array, values: Array, t: Array) -> Array:
@@ -128,6 +131,30 @@ def clock_of(times: Array, channels: Iterable[Array], interval: float) -> Contro
         if found is not None and found.holds(times, values):
             return found
     return None
+
+
+def clock_by_rows(
+    times: Array, interval: float, values: Array | None = None, ground: Array | None = None
+) -> ControllerClock | None:
+    """The clock of a controller that wrote rows of its own at times (n,), s; None where these are not its ticks.
+
+    Where ground acceleration (n,) was recorded in these rows, that of the plan, `ground` (ticks,), says which of the
+    first ticks is in the first row.
+    """
+    if times.size < LEAST_RUNS:
+        return None
+    ticks = np.concatenate([[0], np.cumsum(np.rint(np.diff(times) / interval).astype(int))])
+    apart, begin = np.polyfit(ticks, times, 1)
+    fast = float(apart) / interval - 1.0
+    missed = np.max(np.abs(times - begin - apart * ticks))
+    if abs(fast) > FASTEST or missed > ROUNDED * interval:
+        return None
+    first = 0
+    if values is not None and ground is not None:
+        least = ticks + np.arange(AROUND + 1)[:, None]
+        away = np.abs(ground[np.clip(least, 0, ground.size - 1)] - values).sum(axis=1)
+        first = int(np.argmin(away))
+    return ControllerClock(interval, float(begin - first * apart), fast)
 
 
 def clock_by_ground(times: Array, values: Array, ground: Array, interval: float) -> ControllerClock | None:

@@ -18,7 +18,7 @@ from common.roles import MASTER
 from common.signals import FieldType, Signal
 from models.registry import Array
 from report.text.tabular import DataTable
-from rths.examine.importing.controller_clock import ControllerClock, clock_by_ground, clock_of
+from rths.examine.importing.controller_clock import ControllerClock, clock_by_ground, clock_by_rows, clock_of
 from rths.examine.importing.import_map import ImportMap, SignalSource, in_unit, lab_signals
 from rths.examine.importing.time_base import (
     EVENLY,
@@ -167,7 +167,11 @@ def clock_in(
     by_ground = planned = None
     if (ground := recorded_ground(mapping, table, data, rows)) is not None:
         planned = planned_ground(mapping.plan, float(theirs[-1]))
-        by_ground = None if planned is None else clock_by_ground(theirs, ground, planned, interval)
+    if (own := rows_of_controller(mapping, table, data, rows)) is not None:
+        there = None if ground is None or np.isnan(ground[own]).any() else ground[own]
+        return clock_by_rows(theirs[own], interval, there, planned), planned
+    if ground is not None and planned is not None and np.isfinite(ground).all():
+        by_ground = clock_by_ground(theirs, ground, planned, interval)
     found = clock_of(theirs, columns_of(mapping, table, data, rows), interval)
     if by_ground is None:
         return found, None
@@ -175,13 +179,28 @@ def clock_in(
 
 
 def recorded_ground(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> Array | None:
-    """The ground acceleration (rows,) as a logger recorded a number of the controller, m/s²; None for any other."""
+    """The ground acceleration (rows,) as a logger recorded a number of the controller, m/s²; None for any other.
+
+    It is NaN in rows of another logger.
+    """
     source = mapping.signals.get(GROUND)
     if source is None or source.value is not None or source.filter is not None or source.delay != 0.0:
         return None
     scale, _ = scale_of(GROUND, source, lab_signals(mapping.plan)[GROUND][1], table, data)
     found: Array = scale * pick(table, source.column, data)[rows] + source.offset
-    return found if np.isfinite(found).all() else None
+    return found
+
+
+def rows_of_controller(
+    mapping: ImportMap, table: DataTable, data: Path, rows: Any
+) -> npt.NDArray[np.bool_] | None:
+    """Which rows (n,) have the numbers of the controller, where these stand between those of another logger."""
+    computed = of_controller(mapping.plan)
+    for name, source in mapping.signals.items():
+        if name in computed and source.value is None:
+            own = np.isfinite(pick(table, source.column, data)[rows])
+            return None if own.all() else own
+    return None
 
 
 def planned_ground(plan: Plan, seconds: float) -> Array | None:
