@@ -8,7 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models.registry import Array
-from rths.examine.importing.controller_clock import ControllerClock, clock_by_ground, clock_of
+from rths.examine.importing.controller_clock import (
+    ControllerClock,
+    clock_by_ground,
+    clock_by_rows,
+    clock_of,
+)
 
 INTERVAL, SECONDS = 2e-3, 12.0
 
@@ -177,3 +182,24 @@ def test_the_ground_says_which_tick_is_the_first() -> None:
     assert ground is not None
     assert alone.begin == pytest.approx(0.3e-3, abs=2e-5)
     assert alone.beside(ground).begin == pytest.approx(-1.7e-3, abs=2e-5)
+
+
+@pytest.mark.parametrize("first", [0, 2])
+def test_rows_of_the_controller_s_own_between_those_of_a_logger_are_its_ticks(first: int) -> None:
+    ticks = np.delete(np.arange(3000), [40, 41, 1700])
+    times = np.round(0.0013 + (1.0 + 8e-5) * INTERVAL * ticks, 6)
+    found = clock_by_rows(times, INTERVAL, GROUND[first + ticks], GROUND)
+    assert found is not None
+    assert found.fast == pytest.approx(8e-5, abs=1e-7)
+    assert found.begin == pytest.approx(0.0013 - first * INTERVAL * (1.0 + 8e-5), abs=1e-6)
+    seen, values = found.seen(times, GROUND[first + ticks])
+    assert np.array_equal(np.rint(seen / INTERVAL), first + ticks)
+    assert np.array_equal(values, GROUND[first + ticks])
+
+
+def test_rows_that_jitter_or_have_another_rate_are_no_ticks() -> None:
+    times = INTERVAL * np.arange(3000.0)
+    jitter = 0.1 * INTERVAL * np.random.default_rng(5).uniform(-1.0, 1.0, times.size)
+    assert clock_by_rows(times + jitter, INTERVAL) is None
+    assert clock_by_rows(1.002 * times, INTERVAL) is None
+    assert clock_by_rows(times[:30], INTERVAL) is None
