@@ -103,13 +103,13 @@ class RecordingGaps:
         }
 
     def logged(self, simulated: Mapping[str, Array]) -> Mapping[str, Array]:
-        """Simulated readings as the logger that was found has them: late, and with its gain."""
+        """Simulated readings as the logger that was found has them: late, and with its gain, unless they diverge."""
         if self.record.stated is None:
             return simulated
         interval = self.record.plan.test.interval
         result = dict(simulated)
         for name, (delay, gain) in self.found.logger.items():
-            if name in result:
+            if name in result and np.isfinite(result[name]).all():
                 result[name] = gain * later(result[name], delay / interval)
         return result
 

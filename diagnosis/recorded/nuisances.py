@@ -176,8 +176,11 @@ def through_logger(
 ) -> Array:
     """What a logger records of a laboratory's readings (ticks, signals): after its filters and delays.
 
-    With the commands that `drive` the laboratory, it is known what the readings do between ticks.
+    With the commands that `drive` the laboratory, it is known what the readings do between ticks. A motion that
+    diverges passes no logger.
     """
+    if not np.isfinite(readings).all():
+        return readings
     interval = system.plan.test.interval
     made = [system.effects.sensors.get(name) for name in lab.kind.channels.names]
     later = [one.logger_delay if one else 0.0 for one in made]

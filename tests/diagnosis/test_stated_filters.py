@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable
 from dataclasses import asdict, replace
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from common.recording.imported import IMPORT, LoggerFilter
+from common.recording.imported import IMPORT, ImportedChannel, LoggerFilter
 from common.roles import MASTER
 from diagnosis.diagnose import diagnose
 from diagnosis.findings.logged import logger
@@ -18,6 +19,7 @@ from diagnosis.fits import residuals
 from diagnosis.fits.fitting import fit
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
+from diagnosis.recorded.nuisances import through_logger
 from diagnosis.recorded.record import NOT_LATE, Record
 from diagnosis.report.records import Report
 from models.registry import Array
@@ -116,3 +118,13 @@ def test_noise_behind_a_filter_far_below_the_rate_is_measured_on_few_sums(cases:
     data = residuals.prepare(lab_b(whole), whole)
     assert np.all(np.isfinite(data.white))
     assert np.all(data.white > 0.0)
+
+
+def test_a_motion_that_diverges_passes_no_logger(cases: Cases) -> None:
+    whole = cases.record()
+    lab = lab_b(whole).lab
+    readings = np.full((50, len(lab.kind.channels.names)), np.inf)
+    stated = [ImportedChannel(LoggerFilter("bessel", 4, 90.0), delay=1e-3)] * readings.shape[1]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert through_logger(readings, lab, whole.systems[lab.role], stated, []) is readings
