@@ -36,6 +36,7 @@ IMPORT = "import"  # metadata of an imported recording
 # The low-pass filters usual before the converters of data loggers, those with a ripple in what they pass last.
 FILTERS = ("butterworth", "bessel", "chebyshev", "elliptic")
 RIPPLING = FILTERS[2:]
+HALF_POWER = 0.443  # at which frequency a mean over time loses 3 dB, times that time
 TINY = 1e-12  # Hz, in place of no frequency, at which a high-pass lets nothing pass
 NODES = (-2, -1, 0, 1)  # ticks of the samples around one, through which a cubic goes
 Samples = NDArray[np.float64]
@@ -108,11 +109,12 @@ class ImportedChannel:
     rate: float = 0.0  # sampling rate of the data, Hz; 0 where times have no meaning
     known: bool = False  # whether it was given as a constant rather than measured
     first: float = 0.0  # s after the first tick, of the first of its samples that were interpolated
+    average: float = 0.0  # s, up to which each of its samples is a mean
 
     @property
     def between(self) -> bool:
         """Whether its samples lie between ticks, and show what a reading does there."""
-        return self.interpolated and self.rate > 0.0 and self.filter is None
+        return self.interpolated and self.rate > 0.0 and self.filter is None and self.average == 0.0
 
     def samples(self, ticks: int, interval: float) -> Samples:
         """When the samples that were interpolated at `ticks` were taken, in ticks."""
@@ -123,30 +125,35 @@ class ImportedChannel:
     def passes(self) -> float:
         """Frequency up to which the channel passes a signal and its noise, Hz: its cutoff, or half its own rate."""
         own = 0.5 * self.rate if self.interpolated and self.rate > 0.0 else math.inf
-        return min(own, self.filter.cutoff if self.filter else math.inf)
+        mean = HALF_POWER / self.average if self.average > 0.0 else math.inf
+        return min(own, mean, self.filter.cutoff if self.filter else math.inf)
 
     @property
     def late(self) -> float:
-        """By how much the channel comes late, s: its delay and what its filter delays slow motion by."""
+        """By how much the channel comes late, s: its delay and what filter and mean delay slow motion by."""
+        late = self.delay + 0.5 * self.average
         if self.filter is None:
-            return self.delay
+            return late
         above, below = (np.append(0.0, row)[-2:] / row[-1] for row in self.filter.transfer)
-        return self.delay + float(below[0] - above[0])
+        return late + float(below[0] - above[0])
 
     def response(self, frequency: Samples) -> NDArray[np.complex128]:
-        """Frequency response of its filters and delay at `frequency` (Hz)."""
-        turned = np.exp(-2j * math.pi * self.delay * np.asarray(frequency))
+        """Frequency response of its filters, mean and delay at `frequency` (Hz)."""
+        late = self.delay + 0.5 * self.average
+        turned = np.exp(-2j * math.pi * late * np.asarray(frequency))
+        turned *= np.sinc(self.average * np.asarray(frequency))
         if self.high_pass:
             turned /= 1.0 + self.high_pass / (1j * np.maximum(frequency, TINY))
         return np.asarray(turned if self.filter is None else turned * self.filter.response(frequency))
 
     def through(self, values: Samples, interval: float, more: float = 0.0) -> Samples:
-        """True values (ticks,) as the logger would have recorded them without noise: after its filters and delay.
+        """True values (ticks,) as the logger would have recorded them without noise: after its filters, mean and delay.
 
         They come `more` s later than stated.
         """
         seen = past_high_pass(values, interval, self.high_pass) if self.high_pass else values
         seen = self.filter.filtered(seen, interval) if self.filter else seen
+        seen = averaged(seen, interval, self.average) if self.average else seen
         late = self.delay + more
         return seen if late == 0.0 else later(seen, late / interval)
 
@@ -172,6 +179,13 @@ class ImportedData:
         """The same with a filter of a signal's channel."""
         rows = {**self.channels.get(topic, {}), name: replace(self.channel(topic, name), filter=one)}
         return replace(self, channels={**self.channels, topic: rows})
+
+    def with_average(self, topic: str, name: str, length: float) -> ImportedData:
+        """The same with a signal's channel whose samples are means over some s, of which only a delay may be stated."""
+        said = self.channel(topic, name)
+        delay = said.delay - 0.5 * length if said.delay else 0.0
+        one = replace(said, delay=delay, average=length)
+        return replace(self, channels={**self.channels, topic: {**self.channels.get(topic, {}), name: one}})
 
     def metadata(self) -> dict[str, str]:
         """The values of the metadata record."""
@@ -217,6 +231,21 @@ def past_high_pass(values: Samples, interval: float, corner: float) -> Samples:
     kept = math.exp(-step)
     change = np.diff(values, prepend=values[0])
     return np.asarray(signal.lfilter([-math.expm1(-step) / step], [1.0, -kept], change))
+
+
+def averaged(values: Samples, interval: float, length: float) -> Samples:
+    """Means of a signal (ticks,) over the last `length` s, smooth between ticks and constant before the first one.
+
+    A twelfth of the second differences gives back what straight lines between ticks would take away.
+    """
+    moved = values - values[0]
+    moved[1:-1] -= np.diff(moved, 2) / 12.0
+    whole = np.append(0.0, np.cumsum(0.5 * (moved[1:] + moved[:-1])))
+    begin = np.arange(values.size) - length / interval
+    tick = np.clip(np.floor(begin).astype(np.int64), 0, values.size - 2)
+    place = begin - tick
+    before = whole[tick] + place * moved[tick] + 0.5 * place**2 * (moved[tick + 1] - moved[tick])
+    return np.asarray(values[0] + (whole - np.where(begin > 0.0, before, 0.0)) * interval / length)
 
 
 def later(values: Samples, ticks: float) -> Samples:

@@ -185,7 +185,11 @@ def through_logger(
     made = [system.effects.sensors.get(name) for name in lab.kind.channels.names]
     later = [one.logger_delay if one else 0.0 for one in made]
     places = [
-        None if channel.filter else 0.0 if channel.between else (-(channel.delay + more) / interval) % 1.0
+        None
+        if channel.filter or channel.average
+        else 0.0
+        if channel.between
+        else (-(channel.delay + more) / interval) % 1.0
         for channel, more in zip(stated, later, strict=True)
     ]
     result = readings
@@ -193,7 +197,7 @@ def through_logger(
         between = lab.kind.between_ticks(system, np.stack(drive, axis=1), places)
         result = result + np.where([place != 0.0 for place in places], between, 0.0)
     for number, (channel, more) in enumerate(zip(stated, later, strict=True)):
-        if channel.filter or channel.high_pass or channel.delay + more:
+        if channel.filter or channel.average or channel.high_pass or channel.delay + more:
             result[:, number] = channel.through(result[:, number], interval, more)
     return result
 
@@ -287,8 +291,8 @@ def of_filters(
 
 
 def nothing_stated(mapped: ImportedData | None, lab: RecordedLaboratory) -> bool:
-    """Whether the import map states neither a filter nor a delay for any channel of a laboratory."""
-    return all(one.filter is None and one.delay == 0.0 for one in channels(mapped, lab))
+    """Whether the import map states neither filter nor mean nor delay for any channel of a laboratory."""
+    return all(one.filter is None and one.delay == one.average == 0.0 for one in channels(mapped, lab))
 
 
 def calibrations(

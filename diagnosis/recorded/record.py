@@ -98,13 +98,14 @@ class Record:
     held: float | None = None  # test time (s) of the first hold, before which it ends; None without a hold
     fast: float = 0.0  # rate by which the clock of its readings was fast before they were put right
     early: float = 0.0  # s, by which all readings stood before their time until they were put right
-    edges: tuple[
-        str, ...
-    ] = ()  # readings whose first or last ticks a resampling filter spoilt, which do not count
+    # readings whose first or last ticks a resampling filter spoilt, which do not count
+    edges: tuple[str, ...] = ()
     start: LoggerStart | None = None  # of an import whose ground motion is not on the plan's ticks
     late: Late = NOT_LATE  # by which a logger delays all channels of a kind
     # filters of channels that its import map does not state, by topic and name
     passed: Mapping[tuple[str, str], LoggerFilter] = field(default_factory=dict)
+    # s, of channels whose samples are means over as long, which the map does not state, by topic and name
+    averaged: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     @cached_property
     def mapped(self) -> ImportedData | None:
@@ -117,6 +118,8 @@ class Record:
         said = self.mapped
         for (topic, name), one in self.passed.items():
             said = said and said.with_filter(topic, name, one)
+        for (topic, name), length in self.averaged.items():
+            said = said and said.with_average(topic, name, length)
         return said
 
     @property

@@ -1,4 +1,4 @@
-"""Recorded series that passed different filters and delays of a logger, brought behind the same ones."""
+"""Recorded series that passed different filters, means and delays of a logger, brought behind the same ones."""
 
 from __future__ import annotations
 
@@ -6,24 +6,26 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from common.recording.imported import ImportedChannel, LoggerFilter
+from common.recording.imported import ImportedChannel, LoggerFilter, averaged
 from diagnosis.signals.earlier import earlier
 from models.registry import Array
 
 
 def alike(columns: Array, stated: Sequence[ImportedChannel], late: float, interval: float) -> Array:
-    """Series (ticks, columns) behind the filters stated for any of them, each once, and late by `late` s.
+    """Series (ticks, columns) behind the filters and means stated for any of them, each once, and late by `late` s.
 
-    No filter is undone: each series passes those of the others. Before the first tick all is at rest, as in the model.
+    None is undone: each series passes those of the others. Before the first tick all is at rest, as in the model.
     """
     filters = list(dict.fromkeys(one.filter for one in stated if one.filter is not None))
+    lengths = list(dict.fromkeys(one.average for one in stated if one.average))
     result = np.empty_like(columns)
     for place, channel in enumerate(stated):
         values = columns[:, place]
-        if channel.filter is not None:
-            values = begun(values, channel.filter, interval)
+        values = begun(values, channel, interval)
         for one in filters:
             values = values if one == channel.filter else passed(values, one, interval)
+        for length in lengths:
+            values = values if length == channel.average else mean(values, length, interval)
         result[:, place] = earlier(values, (channel.delay - late) / interval)
     return result
 
@@ -33,7 +35,14 @@ def passed(values: Array, one: LoggerFilter, interval: float) -> Array:
     return one.filtered(np.append(0.0, values), interval)[1:]
 
 
-def begun(values: Array, one: LoggerFilter, interval: float) -> Array:
-    """What a filter that had seen the first value ever before gave (ticks,), as if it had seen zero."""
-    first = np.full(values.size, values[0])
-    return values - first + passed(first, one, interval)
+def mean(values: Array, length: float, interval: float) -> Array:
+    """A series (ticks,), zero before its first tick, as means over the last `length` s."""
+    return averaged(np.append(0.0, values), interval, length)[1:]
+
+
+def begun(values: Array, channel: ImportedChannel, interval: float) -> Array:
+    """What filter and mean of a channel gave (ticks,) that had seen the first value ever before, as if it were zero."""
+    first = seen = np.full(values.size, values[0])
+    seen = passed(seen, channel.filter, interval) if channel.filter is not None else seen
+    seen = mean(seen, channel.average, interval) if channel.average else seen
+    return values - first + seen

@@ -183,6 +183,11 @@ def shape(kind: str, order: int) -> Shape:
     return lambda late: ImportedChannel(LoggerFilter(kind, order, usual / late))
 
 
+def mean(late: float) -> ImportedChannel:
+    """A mean over time that is late by some s."""
+    return ImportedChannel(average=2.0 * late)
+
+
 ROUGH = (shape("", 0), *(shape(kind, USUAL) for kind in KINDS))
 
 
@@ -202,7 +207,7 @@ def roughly(*of: ReadSpectra) -> Said:
 
 
 def likeliest(late: float, beyond: float, *of: ReadSpectra) -> ImportedChannel:
-    """The filter behind which readings are least surprising, of those that delay by about `late` s.
+    """The filter or mean behind which readings are least surprising, of those that delay by about `late` s.
 
     It is a delay alone where none makes them less surprising by more than `beyond`.
     """
@@ -210,7 +215,7 @@ def likeliest(late: float, beyond: float, *of: ReadSpectra) -> ImportedChannel:
     low, high = LATES[max(0, place - 1)], LATES[min(place + 1, len(LATES) - 1)]
     alone, *filters = (
         closest(partial(surprises, of), one, low, high)
-        for one in (shape("", 0), *itertools.starmap(shape, SHAPES))
+        for one in (shape("", 0), mean, *itertools.starmap(shape, SHAPES))
     )
     best = min(filters, key=lambda item: item[1])
     return best[0] if best[1] < alone[1] - beyond else alone[0]

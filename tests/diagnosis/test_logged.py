@@ -278,7 +278,7 @@ def test_series_behind_different_filters_and_delays_are_brought_behind_the_same(
     assert np.allclose(found, found[:, :1], atol=1e-3 * np.max(np.abs(motion)))
     assert np.max(np.abs(found[:, 0] - motion)) > 0.1 * np.max(np.abs(motion))
     biased = 5.0 + low_pass.filtered(motion, interval)  # the bias was there before the first tick
-    begun = alike.begun(biased, low_pass, interval)
+    begun = alike.begun(biased, ImportedChannel(low_pass), interval)
     assert begun == pytest.approx(alike.passed(5.0 + motion, low_pass, interval), abs=1e-7)
 
 

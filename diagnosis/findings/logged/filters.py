@@ -99,7 +99,18 @@ def filtered(record: Record) -> Record:
         forces, others = followed(others, forces, reading_forces), followed(forces, others, reading_others)
         forces, others = alike(forces, others)
     late = Late(Delay(forces.channel.delay), Delay(others.channel.delay))
-    return replace(record, passed=by_channel(forces, others), late=late)
+    return replace(record, passed=by_channel(forces, others), averaged=means(forces, others), late=late)
+
+
+def means(*found: Common) -> dict[tuple[str, str], float]:
+    """The times (s) over which channels have means, by topic and name."""
+    return {
+        (one.role, name): common.channel.average
+        for common in found
+        if common.channel.average
+        for one in common.by
+        for name in one.names
+    }
 
 
 def of_all(labs: Sequence[AlikeReadings]) -> ImportedChannel | None:

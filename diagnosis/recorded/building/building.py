@@ -92,8 +92,8 @@ class Building(Measured):
 
     @property
     def treated(self) -> bool:
-        """Whether filters or delays of a logger differ between its motion, the ground's and the forces."""
-        return len({(one.filter, one.delay) for one in self.channels}) > 1
+        """Whether filters, means or delays of a logger differ between its motion, the ground's and the forces."""
+        return len({(one.filter, one.average, one.delay) for one in self.channels}) > 1
 
     @property
     def ground(self) -> Array:

@@ -160,7 +160,10 @@ class LoggedBuilding(Building):
         position, force, used = self._inputs
         delay, gain = self.logger(system)
         rows = np.column_stack([force, used])
-        late = [not self.behind or one.filter is not None for one in self.channels[-rows.shape[1] :]]
+        late = [
+            not self.behind or one.filter is not None or one.average > 0.0
+            for one in self.channels[-rows.shape[1] :]
+        ]
         if self.alone:
             late[1:] = [False] * len(late[1:])
         rows[:, late] = earlier(rows[:, late], delay / self._interval)

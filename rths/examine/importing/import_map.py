@@ -80,6 +80,9 @@ class SignalSource:
     offset: float = key("offset", default=0.0)
     unit: str = key("unit of the column, instead of a scale", default="")
     delay: float = key("time by which the logger recorded it too late", default=0.0, unit="s")
+    average: float = key(
+        "time up to its row over which each reading is a mean", default=0.0, least=0.0, unit="s"
+    )
     high_pass: float = key("corner of its amplifier's high-pass", default=0.0, least=0.0, unit="Hz")
     calibration: float = key("relative tolerance of its gain", default=0.0, least=0.0, most=1.0)
     resolution: float = field(default=0.0, metadata=key("step of the readings", default=0.0).metadata)
@@ -88,6 +91,11 @@ class SignalSource:
     scaled: bool = field(
         default=False, metadata=key("whether scale or unit is given", default=False).metadata
     )
+
+    @property
+    def late(self) -> bool:
+        """Whether it is stated to come late, by a delay or as a mean over time."""
+        return self.delay != 0.0 or self.average > 0.0
 
 
 APART = ("value", "filter", "resolution")  # keys that need their own check

@@ -184,7 +184,7 @@ def recorded_ground(mapping: ImportMap, table: DataTable, data: Path, rows: Any)
     It is NaN in rows of another logger.
     """
     source = mapping.signals.get(GROUND)
-    if source is None or source.value is not None or source.filter is not None or source.delay != 0.0:
+    if source is None or source.value is not None or source.filter is not None or source.late:
         return None
     scale, _ = scale_of(GROUND, source, lab_signals(mapping.plan)[GROUND][1], table, data)
     found: Array = scale * pick(table, source.column, data)[rows] + source.offset
@@ -342,4 +342,5 @@ def channel(
         interpolated=between and not counted,
         rate=rate,
         first=first if between and not counted else 0.0,
+        average=source.average,
     )
