@@ -80,12 +80,14 @@ class Scales:
     def forms(self, effect: Effect) -> list[tuple[tuple[float, ...], dict[str, float]]]:
         """What an effect may look like, each form by itself: a law at rest is also tried as one that is smooth.
 
-        An end stop is soft or hard against the force at hand; of these the best is one form with the others.
+        An end stop is soft or hard against the force at hand; of these the best is one form with the others. Where
+        either of force and motion was not recorded, it has its usual stiffness.
         """
         shapes = {item.name: item.default for item in effect.parameters if item.default is not None}
-        if (found := effect.contact) and (force := self.peak(found.force)):
+        found = effect.contact
+        if found and (force := self.peak(found.force)) and (motion := self.peak(found.motion)):
             (item,) = (item for item in effect.parameters if item.name == found.stiffness)
-            soft = force / self.peak(found.motion)
+            soft = force / motion
             return [((), {item.name: min(max(share * soft, item.least), item.most)}) for share in HARD]
         smooth = {
             item.name: item.smoothing * self.velocity(effect) for item in effect.parameters if item.smoothing

@@ -1,0 +1,18 @@
+"""Recordings in which signals are absent that a search would like to have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from diagnosis.diagnose import diagnose
+from tests.diagnosis.cases import Cases
+
+
+def test_a_damper_of_which_its_force_alone_was_recorded_is_searched(cases: Cases) -> None:
+    whole = cases.record({"damper.motor_lag": {"time_constant": 0.01}}, duration=4.0)
+    names = ("table_command", "damper_command", "damper_force")
+    signals = {name: whole.signals[name] for name in names}
+    present = {name: whole.present[name] for name in names}
+    found = diagnose({"slave": replace(whole, signals=signals, present=present)}, {})["slave"].report
+    assert found.status in ("explained", "partly_explained", "ambiguous", "unknown_effect")
+    assert {name for verdict in found.which for name in verdict.effects} & {"damper.motor_lag"}
