@@ -47,6 +47,9 @@ UNREST = 0.05  # first value over the largest one from which on a record does no
 # all that is faster; a cubic over REACH ticks to each side (20 ms) gives its place and rate there. 0.1 N on 100 kg
 # moves it by 30 µm in a piece, 1 N that changes sign every 10 mm at 0.2 m/s by 3 µm.
 PIECE, REACH = 0.25, 10
+# Rows in an interval from which on they are not the controller's own, but of a converter that may take its channels in
+# turn, some ten µs apart.
+OWN_RATE = 1.03
 BENT = 8  # times as many steps, in which a command that bends is all but straight
 # Systems of which a part keeps what they did: as many as the slopes of a fit take, and no more numbers than these.
 PLAYED, NUMBERS = 8, 4_000_000
@@ -152,7 +155,9 @@ class LaboratoryPart:
         names = tuple(name for machine in seen for name in machine.parameters)
         self.channels = channels(record.stated, lab)
         self.misses: dict[tuple[float | None, ...], Array] = {}  # what `missed` gives
-        self.retimed = record.retimed or any(channel.interpolated for channel in self.channels)
+        interval = record.plan.test.interval
+        sampled = [one.interpolated or one.rate * interval > OWN_RATE for one in self.channels]
+        self.retimed = record.retimed or any(sampled)
         self.free = nothing_stated(record.mapped, lab)
         self.built_in = lab.kind.name in KINDS  # a user's kind has steps of its own within an interval
         # an actuator that holds its command from the tick on needs no straight lines

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from common.recording.imported import ImportedChannel, LoggerFilter
+from common.recording.imported import IMPORT, ImportedChannel, ImportedData, LoggerFilter
 from diagnosis.findings.certainty.other_causes import EITHER, other_causes
 from diagnosis.findings.certainty.trust import trusted
 from diagnosis.findings.verdict import judge
@@ -18,7 +18,7 @@ from diagnosis.fits.search import at_any_size, search
 from diagnosis.fits.unexplained import foresees, leaves, model_error
 from diagnosis.recorded.parts import FINE_ERROR, MODEL_ERROR, LaboratoryPart
 from diagnosis.recorded.record import Delay, Late, Record
-from tests.diagnosis.cases import Cases, lab_a, lab_b
+from tests.diagnosis.cases import Cases, imported, lab_a, lab_b
 
 TABLE, STROKE = 0, 2  # places of the table's displacement and the damper's stroke among the readings
 SIGNS = {"clear": 3.0, "names": 1.0}  # of a verdict on one effect that stands out clearly
@@ -73,6 +73,18 @@ def test_so_small_a_gap_is_not_looked_for_where_readings_were_moved_in_time(
     assert replace(whole, fast=2e-5).retimed
     data = residuals.prepare(part, whole)
     assert data.fine.erring == (MODEL_ERROR if late else FINE_ERROR)
+
+
+@pytest.mark.parametrize("rate", [500.0, 1000.0])
+def test_so_small_a_gap_is_not_looked_for_behind_a_converter_that_may_take_its_channels_in_turn(
+    cases: Cases, rate: float
+) -> None:
+    whole = imported(cases.record({}, duration=2.0))
+    names = {lab.role: lab.measured for lab in whole.labs}
+    channels = {role: dict.fromkeys(those, ImportedChannel(rate=rate)) for role, those in names.items()}
+    data = ImportedData("measurements.csv", channels=channels)
+    run = replace(whole.run, metadata=whole.run.metadata | {IMPORT: data.metadata()})
+    assert lab_b(replace(whole, run=run)).retimed == (rate > 500.0)
 
 
 def test_a_gap_that_the_inputs_foresee_is_seen_below_what_its_energy_tells(cases: Cases) -> None:
