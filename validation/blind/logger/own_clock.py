@@ -32,6 +32,7 @@ from validation.blind.logger.loggers import AnalogueFilter, Logger, OwnClock
 
 STAMP = "t"  # the column of the time
 TOGETHER = 3  # rows, the most that are lost at one place
+FEWEST = 10  # rows for one that is lost
 
 
 def write_down(case: Case, plan: Plan, played: Path, output: Path, logger: Logger, clock: OwnClock) -> None:
@@ -69,7 +70,8 @@ def table(
     count = math.floor(((ticks - 1) * interval - begin) * clock.rate)
     stamps: Array = np.arange(count, dtype=np.float64) / clock.rate
     kept = np.ones(count, dtype=bool)
-    while count - np.count_nonzero(kept) < clock.lost:
+    lost = min(clock.lost, count // FEWEST)  # of a test that a limit ended soon
+    while count - np.count_nonzero(kept) < lost:
         place = int(draw.integers(1, count - TOGETHER))
         kept[place : place + int(draw.integers(1, TOGETHER + 1))] = False
     times = begin + stamps / (1.0 + clock.fast)
