@@ -18,7 +18,7 @@ from diagnosis.fits import fitting, worth
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Values, lay
 from diagnosis.fits.laws.best import BETTER, frees
-from diagnosis.fits.laws.loop_response import LoopResponse
+from diagnosis.fits.laws.loop_response import LoopResponse, places_read
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.screening import Plane
 from diagnosis.fits.threads import unshared
@@ -66,13 +66,16 @@ def whole_loops(bare: Fit, first: Sequence[Fit]) -> list[Fit]:
 
 
 def table_of(part: Part) -> LaboratoryPart | None:
-    """The table of a part, of several recordings in the one that moves most; None where there is none with a loop."""
+    """The table of a part, of several recordings in the one that moves most.
+
+    None where there is none with a loop, or nothing of the table was read.
+    """
     if isinstance(part, JoinedPart):
         tables = [one for piece in part.pieces if (one := table_of(piece)) is not None]
         return max(tables, key=lambda one: float(np.ptp(next(iter(one.inputs.values())))), default=None)
     if not isinstance(part, LaboratoryPart) or part.lab.kind.name != TABLE:
         return None
-    driven = np.ptp(next(iter(part.inputs.values()))) > 0.0
+    driven = bool(places_read(part)) and np.ptp(next(iter(part.inputs.values()))) > 0.0
     return part if driven and math.isfinite(part.lab.plan.table.frequency) else None
 
 

@@ -24,6 +24,12 @@ THERE = 0.95  # of its samples that a reading must have
 READ = ("table_displacement", "table_acceleration")
 
 
+def places_read(part: LaboratoryPart) -> list[int]:
+    """The places of the readings of a table that were recorded."""
+    shown = part.present.mean(axis=0) > THERE
+    return [place for place, name in enumerate(part.lab.kind.channels.names) if name in READ and shown[place]]
+
+
 class LoopResponse(Measured):
     """The spectra of a table's readings, (2·lines, readings): real parts, and below them imaginary parts."""
 
@@ -32,8 +38,7 @@ class LoopResponse(Measured):
 
     def __init__(self, part: LaboratoryPart, interval: float) -> None:
         names = part.lab.kind.channels.names
-        shown = part.present.mean(axis=0) > THERE
-        places = [place for place, name in enumerate(names) if name in READ and shown[place]]
+        places = places_read(part)
         self.role, self.nuisances, self.candidates = part.role, part.nuisances, part.candidates
         self.signals = tuple(part.signals[place] for place in places)
         self._names, self._step = [names[place] for place in places], interval / max(part.steps, 1)
