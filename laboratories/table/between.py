@@ -14,6 +14,13 @@ from models.system import System
 PLACES = 32  # between ticks, at which the force of a motor is computed exactly
 
 
+def motor_at_ticks(system: System, command: Array) -> tuple[Array, Array]:
+    """What is asked of the motor (ticks,) N within its limit, and its states at the ticks (3, ticks)."""
+    effects, lag = system.effects.damper, system.plan.damper.motor_time_constant
+    wanted = np.clip(effects.gain * command, -effects.force_limit, effects.force_limit)
+    return wanted, motor.states(wanted, system.plan.test.interval, lag, effects.motor_damping)
+
+
 def motor_bend(system: System, command: Array, place: float | None = None) -> Array:
     """Means of the motor's force around each tick, less those of a smooth curve through the ticks, (ticks,) N.
 
@@ -23,10 +30,9 @@ def motor_bend(system: System, command: Array, place: float | None = None) -> Ar
     and then slowly. What it has beyond a straight line is the mean of that in the two intervals beside a tick; a smooth
     curve lies below the line by second differences. The limit of the force is taken to be sharp.
     """
-    effects, lag = system.effects.damper, system.plan.damper.motor_time_constant
-    wanted = np.clip(effects.gain * command, -effects.force_limit, effects.force_limit)
-    interval, damping = system.plan.test.interval, effects.motor_damping
-    states = motor.states(wanted, interval, lag, damping)
+    lag, damping = system.plan.damper.motor_time_constant, system.effects.damper.motor_damping
+    interval = system.plan.test.interval
+    wanted, states = motor_at_ticks(system, command)
     at = 0.5 if place is None else place
     along = (1.0 - at) * states[motor.FORCE, :-1] + at * states[motor.FORCE, 1:]
     inside = wanted[:-1] if at > 0.0 else states[motor.FORCE, :-1]  # of a motor that follows at once
@@ -46,10 +52,9 @@ def motor_apart(system: System, command: Array, where: Array) -> Array:
 
     `command` and the limit are those of `motor_bend`.
     """
-    effects, lag = system.effects.damper, system.plan.damper.motor_time_constant
-    wanted = np.clip(effects.gain * command, -effects.force_limit, effects.force_limit)
-    interval, damping = system.plan.test.interval, effects.motor_damping
-    states = motor.states(wanted, interval, lag, damping)
+    lag, damping = system.plan.damper.motor_time_constant, system.effects.damper.motor_damping
+    interval = system.plan.test.interval
+    wanted, states = motor_at_ticks(system, command)
     tick = np.clip(np.floor(where).astype(np.int64), 0, command.size - 2)
     place = np.clip(where - tick, 0.0, 1.0)
     now, then = states[motor.FORCE, tick], states[motor.FORCE, tick + 1]
@@ -65,18 +70,23 @@ def motor_apart(system: System, command: Array, where: Array) -> Array:
     return np.asarray(np.where(place > 0.0, inside - (1.0 - place) * now - place * then + curve, 0.0))
 
 
+def corners(system: System, command: Array) -> tuple[float, float, Array]:
+    """The table's frequency (rad/s), its dead time (ticks), and the second differences of its command (ticks,) m."""
+    table = system.plan.table
+    steps = np.zeros(command.size)
+    steps[1:-1] = np.diff(system.effects.table.gain * command, 2)
+    return 2.0 * math.pi * table.frequency, table.delay / system.plan.test.interval, steps
+
+
 def acceleration_apart(system: System, command: Array, where: Array) -> Array:
     """The table's acceleration at places `where` (n,) in ticks, less that of lines between the ticks, (n,) m/s².
 
     `command` is that of `acceleration_bend`, which has the formula.
     """
-    table, interval = system.plan.table, system.plan.test.interval
-    if math.isinf(table.frequency):
+    if math.isinf(system.plan.table.frequency):
         return np.zeros(where.size)
-    omega, ticks = 2.0 * math.pi * table.frequency, table.delay / interval
+    omega, ticks, steps = corners(system, command)
     between = ticks % 1.0
-    steps = np.zeros(command.size)
-    steps[1:-1] = np.diff(system.effects.table.gain * command, 2)
     inside = (where - between) % 1.0
     height = 0.5 * inside * (1.0 - inside) - 0.5 * between * (1.0 - between)
     return np.asarray(omega**2 * height * np.interp(where - 1.0 - ticks, np.arange(command.size), steps))
@@ -91,13 +101,10 @@ def acceleration_bend(system: System, command: Array, place: float | None = None
     the dead time has it, the rate of the acceleration of a loop of second order steps by ω²·ü·Δ, and between them it
     falls by as much: arcs of a height ω²·ü·Δ²/8, whose mean is ω²·ü·Δ²·(1/12 − φ·(1 − φ)/2) above their ticks.
     """
-    table, interval = system.plan.table, system.plan.test.interval
-    if math.isinf(table.frequency):
+    if math.isinf(system.plan.table.frequency):
         return np.zeros(command.size)
-    omega, ticks = 2.0 * math.pi * table.frequency, table.delay / interval
+    omega, ticks, steps = corners(system, command)
     between = ticks % 1.0
-    steps = np.zeros(command.size)
-    steps[1:-1] = np.diff(system.effects.table.gain * command, 2)
     inside = 0.0 if place is None else (place - between) % 1.0
     height = 1.0 / 12.0 if place is None else 0.5 * inside * (1.0 - inside)
     return omega**2 * (height - 0.5 * between * (1.0 - between)) * later(steps, 1.0 + ticks)
