@@ -202,6 +202,8 @@ def amplitude(logger: Logger, level: float, unit: str, values: Array, interval: 
     if logger.bits:
         middle = math.sqrt(RANGE[0] * RANGE[1])
         power = power + (2.0 * middle * float(np.max(np.abs(values))) / 2**logger.bits) ** 2 / 12.0
+    if logger.clock is not None:  # the noise of a row, of which there are more or fewer than ticks
+        power = power / (logger.clock.rate * interval)
     if logger.hum:
         power = np.where(np.abs(frequency - MAINS) < WIDTH, np.inf, power)
     return np.asarray(np.sqrt(power))

@@ -164,6 +164,7 @@ def test_the_oracle_sees_less_through_a_logger_that_adds_noise_at_the_signals_fr
     assert size("") == pytest.approx(white, rel=0.01)
     assert size("pink") < 0.5 * white  # its power is where the wave is
     assert size("low_pass_50") < white
+    assert size("250_hz") == pytest.approx(white / math.sqrt(2.0), rel=0.01)  # half as many rows as ticks
     hum = {"column_force": 10.0 * np.sin(2.0 * math.pi * 50.0 * t)}
     assert size("hum", hum) < 0.01 * size("", hum)
     assert oracle.amplitude(Logger("", printed=True), 0.0, "N", np.asarray(t), 0.002)[0] == pytest.approx(
