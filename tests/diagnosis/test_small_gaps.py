@@ -84,7 +84,9 @@ def test_so_small_a_gap_is_not_looked_for_behind_a_converter_that_may_take_its_c
     channels = {role: dict.fromkeys(those, ImportedChannel(rate=rate)) for role, those in names.items()}
     data = ImportedData("measurements.csv", channels=channels)
     run = replace(whole.run, metadata=whole.run.metadata | {IMPORT: data.metadata()})
-    assert lab_b(replace(whole, run=run)).retimed == (rate > 500.0)
+    record = replace(whole, run=run)
+    fine = residuals.prepare(lab_b(record), record).fine
+    assert fine.erring == (MODEL_ERROR if rate > 500.0 else FINE_ERROR)
 
 
 def test_a_gap_that_the_inputs_foresee_is_seen_below_what_its_energy_tells(cases: Cases) -> None:

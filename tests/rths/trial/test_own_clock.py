@@ -20,7 +20,7 @@ from validation.blind.cases.basis import basis
 from validation.blind.cases.case import Case, levels, reality
 from validation.blind.draw import begin, draw
 from validation.blind.logger import own_clock
-from validation.blind.logger.loggers import OUT_OF_STEP, AnalogueFilter
+from validation.blind.logger.loggers import LOGGERS, OUT_OF_STEP, AnalogueFilter
 from validation.blind.record import record
 from validation.blind.sets import SETS
 from validation.blind.size import play
@@ -93,6 +93,17 @@ def test_a_recording_is_an_import_whose_readings_are_those_of_the_laboratory(
     late = 0.2e-3 if logger != "bessel" else 5e-3  # s, of the clock that was found, and of the filter
     slope = np.sqrt(np.mean(np.gradient(force, 0.002) ** 2))
     assert error < 1.2 * levels(case.truths)["column_force"] + late * slope
+
+
+def test_a_test_that_a_limit_ended_soon_loses_no_rows(run: Run) -> None:
+    case, ticks = drawn("lost_rows", "formula"), 6
+    columns = {topic: {name: x[:ticks] for name, x in own.items()} for topic, own in run.columns.items()}
+    soon = replace(run, columns=columns, sequences={topic: x[:ticks] for topic, x in run.sequences.items()})
+    logger = LOGGERS["lost_rows"]
+    assert logger.clock is not None
+    stamps, rows = own_clock.table(case, from_tables(case.plan, Path()), soon, logger, logger.clock)
+    assert np.diff(stamps) == pytest.approx(1.0 / 800.0)
+    assert {values.size for values in rows.values()} == {stamps.size}
 
 
 def test_laboratories_whose_readings_between_ticks_are_not_known_are_refused(run: Run) -> None:
