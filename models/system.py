@@ -119,6 +119,7 @@ class TableEffects:
     second_damping: float = 0.03  # ratio at that frequency
     second_law: float = 0.0  # 0 the loop opposes its stiffness, 1 its flow
     velocity_limit: float = math.inf  # m/s, at which the loop's valve is open
+    velocity_limit_sharpness: float = math.inf  # with which the speed bends there
     compliance: float = 0.0  # m/N
     backlash: float = 0.0  # m, whole play
     backlash_law: float = 0.0  # 0 before the loop, 1 between loop and platform
@@ -150,6 +151,8 @@ class DamperEffects:
     offset: float = 0.0  # N, a constant force on the moving mass
     motor_damping: float = math.inf  # ratio of a motor of second order, infinite for one of first order
     asymmetry: float = 0.0  # share by which the dashpot is stronger in the positive direction
+    damping_exponent: float = 1.0  # n of a dashpot whose force grows with the speed to the power of n
+    stiffening: float = 0.0  # 1/m², share of its stiffness that the spring gains with the stroke squared
     second_frequency: float = math.inf  # Hz, of a share of the mass on the coupling that it lies behind
     second_mass: float = 0.2  # that share
     second_damping: float = 0.1  # ratio of the coupling's dashpot to the critical one of that share

@@ -26,7 +26,9 @@ from laboratories.table.record import (
     COUPLED_RATE,
     COUPLING,
     DAMPED,
+    DAMPING_EXPONENT,
     FASTEST,
+    FASTEST_SHARPNESS,
     FRICTION,
     GAP,
     GUIDE,
@@ -38,6 +40,7 @@ from laboratories.table.record import (
     SECOND,
     SHAPE,
     SOFT,
+    STIFFENING,
     STOP,
     STOP_DAMPING,
     STOP_EXPONENT,
@@ -55,10 +58,12 @@ from laboratories.table.record import (
 from models import friction, preisach, stops
 from models.compiled import jit
 from models.registry import Array
+from models.saturation import saturated
 
 # Of Halley's method: four of them leave an error of rounding as long as friction stops the mass, within a segment, over
 # no more than a thousand times the presliding; 200 N on 16 kg do so over 0.8 µm.
 CLIMBS = 5
+PACE = 0.1  # m/s, at which a dashpot with a power of the speed has the force of a linear one
 ARRIVED = 1e-17  # of the distance: what is then still missing, about this much at most, is below what a number holds
 
 
@@ -142,9 +147,10 @@ def resist(columns: Array, lab: TableLab, length: float) -> None:
             limits[STOP_EXPONENT],
             limits[STOP_DAMPING],
         )
-    if limits[ASYMMETRY] != 0.0:
+    if limits[ASYMMETRY] != 0.0 or limits[DAMPING_EXPONENT] != 1.0:
         rate = 0.5 * (state[STROKE_RATE] + with_forces(columns, state, lab.free, STROKE_RATE))
-        state[rail] += limits[ASYMMETRY] * lab.spring[1] * abs(rate)
+        state[rail] += lab.spring[1] * beyond_linear(rate, limits[ASYMMETRY], limits[DAMPING_EXPONENT])
+    state[rail] += lab.spring[0] * limits[STIFFENING] * middle**3
     if limits[SECOND] > 0.0:
         state[size + INPUTS + HELD] = coupling.force(
             state[size + INPUTS + APART],
@@ -182,6 +188,15 @@ def resist(columns: Array, lab: TableLab, length: float) -> None:
 
 
 @jit
+def beyond_linear(rate: float, asymmetry: float, exponent: float) -> float:
+    """What a dashpot resists with beyond a linear one, over its coefficient: a velocity (m/s) at a rate (m/s)."""
+    more = asymmetry * abs(rate)
+    if exponent != 1.0 and rate != 0.0:
+        more += rate * ((abs(rate) / PACE) ** (exponent - 1.0) - 1.0)
+    return float(more)
+
+
+@jit
 def bearings(columns: Array, lab: TableLab, length: float, base: int) -> float:
     """Acceleration (m/s²) that the friction of the table's bearings gives it over a segment; `base` is its rate."""
     limits, state, size = lab.limits, lab.state, columns.shape[0] - INPUTS
@@ -202,7 +217,7 @@ def throttled(limits: Array, state: Array, size: int, base: int, length: float) 
     """Acceleration (m/s²) that the table's loop lacks as its valve opens so far only, at the middle of a segment."""
     command = 0.5 * (state[size] + state[size + 1])
     wanted = limits[OPENING] * (command - state[base - 1] - 0.5 * length * state[base])
-    return float(limits[VALVE] * (min(max(wanted, -limits[FASTEST]), limits[FASTEST]) - wanted))
+    return float(limits[VALVE] * (saturated(wanted, limits[FASTEST], limits[FASTEST_SHARPNESS]) - wanted))
 
 
 @jit

@@ -101,7 +101,8 @@ def build(
     limits += [on_damper.presliding, *behind, on_damper.stop_exponent, on_damper.stop_damping]
     limits += [on_damper.force_limit_sharpness]
     limits += [*valve(table, on_table), on_damper.asymmetry, *behind_coupling, on_table.presliding]
-    limits += fed(interval, table, on_table)
+    limits += [*fed(interval, table, on_table), on_table.velocity_limit_sharpness]
+    limits += [on_damper.damping_exponent, on_damper.stiffening]
     return TableLab(
         taps,
         walk,

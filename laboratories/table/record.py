@@ -32,6 +32,8 @@ TABLE_PRESLIDING = 36  # m, of the table's friction
 # of what is fed forward: the share of a change of rate that passes the filter in an interval, 0 where nothing is fed
 # forward, ticks per s, the velocity's time s, and the acceleration's s²
 FED, FED_TICKS, FED_VELOCITY, FED_ACCELERATION = 37, 38, 39, 40
+FASTEST_SHARPNESS = 41  # of the bend at the loop's highest speed
+DAMPING_EXPONENT, STIFFENING = 42, 43  # of the damper's dashpot and spring, the latter 1/m²
 
 # places in `state` behind the states and inputs
 PLAYED, LAST_VELOCITY, BRISTLES, APART, APART_RATE, HELD, TABLE_BRISTLES, LAST_COMMAND, FED_RATE = range(9)

@@ -29,7 +29,8 @@ KEPT = 64  # divisions of an interval
 def levels(interval: float, table: TableEffects, damper: DamperEffects) -> tuple[int, ...]:
     """Into how many segments an interval (s) is divided, from the longest to the shortest."""
     usual = substeps(interval)
-    law = table.learned or damper.learned or table.backlash_law == BEHIND_LOOP or damper.asymmetry != 0.0
+    bent = damper.asymmetry != 0.0 or damper.damping_exponent != 1.0 or damper.stiffening != 0.0
+    law = table.learned or damper.learned or table.backlash_law == BEHIND_LOOP or bent
     if law or not (math.isinf(table.velocity_limit) and math.isinf(damper.second_frequency)):
         return (usual,)
     rubbing = [part for part in (table, damper) if part.friction]

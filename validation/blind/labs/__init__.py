@@ -82,7 +82,10 @@ UNCATALOGUED: dict[str, tuple[str, tuple[str, ...], tuple[tuple[float, float], .
     "x.sensor.column_force.missing": ("sensor.column_force", ("probability",), ((0.01, 0.3),)),
     "x.sensor.damper_force.missing": ("sensor.damper_force", ("probability",), ((0.01, 0.3),)),
 }
-"""Effects in no catalogue: site, parameters, and for each of these its weak and strong value.
+"""Effects with no entry in the catalogue: site, parameters, and for each of these its weak and strong value.
 
 The ranges are chosen for the default test: from an effect that noise may hide to one that no diagnosis should miss.
 """
+
+ALIKE = {"x.damper.cubic_spring": ("damper.stiffness",)}
+"""Of these the effects of the catalogue that have such a law, so that their names are right as well."""
