@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from common.plan.plan import Plan
 from common.signals import COLUMN_CHANNELS
@@ -11,6 +11,7 @@ from laboratories.column import model
 from laboratories.column.model import ColumnLab
 from laboratories.descent import HoldRamp
 from laboratories.kind import Chosen, Coupling, Follows, Hysteresis, Kind, Limited, Machine, Pictured, Sensed
+from models import specimens
 from models.compiled import bound
 from models.registry import Array
 from models.system import System
@@ -27,6 +28,7 @@ PARAMETERS = {  # parameters of [actuator] that have a tolerance, by its model
         "actuator.servo.delay",
     ),
 }
+FARTHEST = 4.0  # tolerances by which a parameter of a specimen's model must be free to move
 
 
 class ColumnKind(Kind):
@@ -61,12 +63,37 @@ class ColumnKind(Kind):
             ),
             Machine(
                 "column",
-                ("column.stiffness", "column.mass", "column.damping"),
+                ("column.stiffness", "column.mass", "column.damping", *self.of_model(plan)),
                 read,
                 ("column_displacement", "column_force"),
                 shown=("column_force",),
             ),
         )
+
+    def of_model(self, plan: Plan) -> tuple[str, ...]:
+        """The parameters of the specimen's model beside its stiffness, of which it admits some tolerances more or less.
+
+        At the bound of a range, as a share of one, a parameter cannot move to both sides, and counts as known.
+        """
+        column, names = plan.column, []
+        for own, value in column.parameters.items():
+            width = FARTHEST * self.tolerance(plan, f"column.{own}")
+            moved = [column.parameters | {own: value * (1.0 + share)} for share in (-width, width)]
+            if all(specimens.admits(column.model, stiffness=column.stiffness, **one) for one in moved):
+                names.append(f"column.{own}")
+        return tuple(names)
+
+    def planned(self, plan: Plan, name: str) -> Any:
+        """The value of a nominal parameter of `machines`, which may be one of the specimen's model."""
+        own = name.removeprefix("column.")
+        return plan.column.parameters[own] if own in plan.column.parameters else super().planned(plan, name)
+
+    def scaled(self, system: System, name: str, factor: float) -> System:
+        """The system with a nominal parameter multiplied."""
+        own, known = name.removeprefix("column."), system.plan.column.parameters
+        if own not in known:
+            return super().scaled(system, name, factor)
+        return system.moved("column", parameters=known | {own: factor * known[own]})
 
     def settle(self, lab: ColumnLab, truth: Array, command: float, interval: float) -> bool:
         """Bring the laboratory to rest with the specimen deformed by the command; always possible."""

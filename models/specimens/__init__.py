@@ -114,6 +114,15 @@ def pack(name: str, **params: float) -> tuple[int, Array, Array]:
     return model.code, values, np.zeros(STATE_SIZE)
 
 
+def admits(name: str, **params: float) -> bool:
+    """Whether a model can have these parameters."""
+    try:
+        pack(name, **params)
+    except InputError:
+        return False
+    return True
+
+
 @jit
 def step(kind: int, p: Array, s: Array, deformation: float) -> float:
     """Force (N) of the model with code `kind` at a deformation (m); its memory `s` moves on."""
