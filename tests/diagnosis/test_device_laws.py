@@ -24,10 +24,13 @@ class FrictionDamper(ColumnAlone):
 
     PUSH, PULL, JOINT, PLAY = 6e3, 9e3, 20e6, 1e-3
 
-    def __init__(self) -> None:
+    def __init__(self, laboratory: str = "") -> None:
         self.signals, self.nuisances, self.role = ("column_force",), (), MASTER
         self.candidates = tuple(
-            CATALOGUE[f"column.{name}"] for name in ("yielding", "slip", "friction", "viscous", "stiffness")
+            replace(
+                CATALOGUE[f"column.{name}"], name=f"{laboratory}column.{name}", site=f"{laboratory}column"
+            )
+            for name in ("yielding", "slip", "friction", "viscous", "stiffness")
         )
         self.inputs = swelling()
         place, force = 0.0, np.empty(TICKS)
@@ -40,12 +43,16 @@ class FrictionDamper(ColumnAlone):
         self.present = np.ones((TICKS, 1), dtype=bool)
 
 
-def test_a_friction_damper_with_play_is_friction_and_slip_whatever_stiffness_is_planned() -> None:
-    part = FrictionDamper()
-    data = data_of(part)
+@pytest.mark.long
+@pytest.mark.parametrize("laboratory", ["", "slave.above."])
+def test_a_friction_damper_with_play_is_friction_and_slip_whatever_stiffness_is_planned(
+    laboratory: str,
+) -> None:
+    part = FrictionDamper(laboratory)
+    data = replace(data_of(part), catalogue={effect.name: effect for effect in part.candidates})
     bare = fitting.fit(data, {})
     found, *_ = coupled(bare, [bare])
-    friction, slip = found.values["column.friction"], found.values["column.slip"]
+    friction, slip = (found.values[f"{laboratory}column.{name}"] for name in ("friction", "slip"))
     assert friction["force"] == pytest.approx(0.5 * (part.PUSH + part.PULL), rel=0.02)
     assert friction["asymmetry"] == pytest.approx(-0.2, abs=0.01)
     assert slip["gap"] == pytest.approx(part.PLAY, rel=0.05)

@@ -23,7 +23,7 @@ MUCH = 0.05
 LONG = 20  # steps of such a fit
 BEYOND = 2.0  # times the largest force measured: a slider's own one is passed on before it slides
 TOGETHER = 2  # of such fits, those that are fitted to their end
-STIFFNESS = "column.stiffness"  # what a law with the planned stiffness has beside it where that is wrong
+STIFFNESS = "column.stiffness"  # stands beside a law with the planned stiffness where that is wrong
 OTHERWISE = 1.25  # factor on the planned stiffness beyond which that effect stands beside a law of yielding
 
 
@@ -95,7 +95,8 @@ def beside(fit: Fit, effect: Effect, place: int, found: SpecimenFit) -> Values:
     base = effect.under(place, effect.values({strength.name: 0.0}))
     planned = fit.data.system.plan.column.stiffness
     result = {effect.name: base | as_specimen(effect, law, strength, found.parameters, planned)}
-    for name, renamed in law.beside.items():
+    for own, renamed in law.beside.items():
+        name = of_same_site(own, effect)
         other = catalogue[name]
         index = next(
             i for i, item in enumerate(other.laws) if set(item.shapes) <= set(renamed) and item.shapes
@@ -106,7 +107,13 @@ def beside(fit: Fit, effect: Effect, place: int, found: SpecimenFit) -> Values:
     if law.beside or UNCRACKED in law.shapes:
         return result
     factor = found.parameters["stiffness"] / planned
-    if STIFFNESS not in catalogue or 1.0 / OTHERWISE < factor < OTHERWISE:
+    stiffness = of_same_site(STIFFNESS, effect)
+    if stiffness not in catalogue or 1.0 / OTHERWISE < factor < OTHERWISE:
         return result
-    (parameter,) = catalogue[STIFFNESS].parameters
-    return {STIFFNESS: {parameter.name: within(parameter, factor)}} | result
+    (parameter,) = catalogue[stiffness].parameters
+    return {stiffness: {parameter.name: within(parameter, factor)}} | result
+
+
+def of_same_site(name: str, effect: Effect) -> str:
+    """The effect of that name, as a test with one column has it, at the site of another effect."""
+    return f"{effect.site}.{name.rpartition('.')[2]}"
