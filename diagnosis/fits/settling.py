@@ -39,8 +39,9 @@ def settled(fit: Fit, accepted: Data | None = None) -> Fit:
     """The fit moved to the best parameters under the noise that it leaves, and with data that have this noise.
 
     Fit and noise follow from each other, and are found in turn. Where much of what the fit leaves follows from the
-    inputs, the quiet part holds a gap as well as noise. The noise is then taken to be white, of the level of the
-    highest frequencies or of averaged samples, whichever is quieter, beside the mains, which no machine follows.
+    inputs, the quiet part holds a gap as well as noise. The noise is then taken to be white, of the level of single
+    samples or of averaged ones, whichever is quieter, beside the mains, which no machine follows. The level of the
+    highest frequencies alone is no measure: what another formula of the true law leaves lies below them.
     `accepted` are data whose noise beside other effects was accepted; louder noise is doubted.
     """
     if fit.data.part.exact:

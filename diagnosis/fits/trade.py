@@ -18,6 +18,7 @@ from diagnosis.fits.hypothesis import Problem, left_out
 from diagnosis.fits.laws.afresh import afresh
 from diagnosis.fits.laws.best import ROUNDS, STEPS, begun, descended, fitted, raced
 from diagnosis.fits.laws.loop import of_one_loop, single
+from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import leaves
@@ -217,6 +218,22 @@ def in_further_laws(fit: Fit, first: Sequence[Fit]) -> list[Fit]:
     starts = each(lambda item: begun(item, modelled=False), alike)
     found = each(lambda item: fitted(item, STEPS, ROUNDS), [item for items in starts for item in items])
     return [item for item in found if item.prior < fit.prior - PULLED]
+
+
+def under_unlike(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:
+    """Single effects under laws that no first law is like, in the place of one that leaves something.
+
+    A search looks at such laws only where no first law promises much: a soft end stop promises nearly all of what a
+    spring does that stiffens with its stroke.
+    """
+    if len(fit.names) != 1 or not leaves(fit) or fit.data.part.exact:
+        return []
+    other = fitting.at(fit.data, bare.values, bare.z)
+    found = [
+        item for item in unlike_first(fitting.begun(other), scales) if item.effect.name not in fit.values
+    ]
+    starts = [({item.effect.name: item.values}, item.z) for item in found[:TRIED]]
+    return each(lambda start: descended(fitting.fit(fit.data, start[0], start[1], STEPS)), starts)
 
 
 def two_for_one(fit: Fit, rivals: Sequence[Fit], scales: Scales, most: int) -> Fit:

@@ -111,7 +111,8 @@ def cancelling(bare: Fit, fit: Fit, sizes: list[Array]) -> bool:
     """Whether effects of a fit do far more than the gap they explain, and undo each other; `sizes` as `changes` gives.
 
     Such an effect does far more both beside the others and by itself. One that keeps a motion small does so only beside
-    a law that is steep farther out.
+    a law that is steep farther out, and what nominal parameters within their tolerances do as well is no more than they
+    had taken over.
     """
     gap = max(float(np.max(np.mean(np.square(bare.reduced), axis=0))), 1.0)
     large = [
@@ -119,10 +120,24 @@ def cancelling(bare: Fit, fit: Fit, sizes: list[Array]) -> bool:
     ]
     without = fitting.at(fit.data, {}, fit.z) if large else fit
     for name in large:
-        change = fitting.at(fit.data, {name: fit.values[name]}, fit.z).reduced - without.reduced
-        if float(np.max(np.mean(np.square(change), axis=0))) > CANCELLED**2 * gap:
+        rest = {key: values for key, values in fit.values.items() if key != name}
+        beside = fitting.at(fit.data, rest, fit.z).reduced - fit.reduced
+        alone = without.reduced - fitting.at(fit.data, {name: fit.values[name]}, fit.z).reduced
+        if all(mean_square(beyond_nominal(fit, one)) > CANCELLED**2 * gap for one in (beside, alone)):
             return True
     return False
+
+
+def mean_square(change: Array) -> float:
+    """The largest mean square of a change of the residuals (groups, signals) over the signals."""
+    return float(np.max(np.mean(np.square(change), axis=0)))
+
+
+def beyond_nominal(fit: Fit, change: Array) -> Array:
+    """A change of the residuals (groups, signals) less what nominal parameters do as well, each at its tolerance."""
+    slopes = fit.jacobian[:, : fit.z.size]
+    moved = np.linalg.solve(slopes.T @ slopes + np.eye(fit.z.size), slopes.T @ change.ravel())
+    return np.asarray(change - (slopes @ moved).reshape(change.shape))
 
 
 def refines(bare: Fit, before: Fit, after: Fit) -> bool:
