@@ -101,8 +101,9 @@ def check_storeys(plan: Plan) -> None:
     values = {"stiffness": structure.stiffness, "damping": structure.damping}
     for name, given in values.items():
         if len(given) != storeys:
+            instead = ", or damping_ratio in their place" if name == "damping" else ""
             raise PlanError(
-                f"[structure] has {storeys} masses but {len(given)} values of {name}: give one per storey."
+                f"[structure] has {storeys} masses but {len(given)} values of {name}: give one per storey{instead}."
             )
     check_places(plan)
 

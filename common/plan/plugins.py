@@ -61,7 +61,7 @@ def _from_file(path: Path) -> ModuleType:
     if not path.is_file():
         raise InputError(
             f"There is no file {path}: a plug-in's path starts from the folder of the plan, reality or recording "
-            "that names it."
+            "that names it. Put the file there, or give the plan beside it with --plan where a recording names it."
         )
     digest = hashlib.blake2b(bytes(path.resolve()), digest_size=8).hexdigest()
     name = f"rths_plugin_{path.stem}_{digest}"  # the same in every process, because compiled kernels are kept by name

@@ -193,7 +193,8 @@ def in_range(value: Any, rule: Rule, name: str) -> Any:
         if rule.pattern:
             raise PlanError(f"{name} is {value!r}: use {rule.allowed()}.")
         hint = nearest(value, rule.choices) if rule.choices and isinstance(value, str) else ""
-        raise PlanError(f"{name} is {value!r}, but must be {rule.allowed()}{'; ' + hint if hint else ''}.")
+        end = f"; {hint}" if hint.endswith("?") else f"{'; ' * bool(hint)}{hint}."
+        raise PlanError(f"{name} is {value!r}, but must be {rule.allowed()}{end}")
     return value
 
 

@@ -68,6 +68,10 @@ WRONG = {
     "name with a slash": ("[test]\nname = 'a/b'\n", "use lower-case letters, digits, - and _"),
     "value for a table": ("column = 3\n", r"\[column\] must be a table, not 3"),
     "lengths that differ": ("[structure]\nmass = [1.0, 2.0]\n", "has 2 masses but 1 values of stiffness"),
+    "dashpots missing": (
+        "[structure]\nmass = [1.0, 2.0]\nstiffness = [1.0, 2.0]\n",
+        "has 2 masses but 1 values of damping: give one per storey, or damping_ratio in their place",
+    ),
     "storey that is not there": (
         "[column]\nstorey = 2\n",
         r"storey in \[column\] is 2, but the structure has 1",

@@ -49,6 +49,21 @@ def test_named_slaves_keep_the_order_of_the_file_and_their_own_keys_override_com
     assert roof.of("slave") is roof
 
 
+def test_a_slave_with_another_model_has_none_of_the_parameters_of_the_common_one() -> None:
+    text = (
+        "[column]\nmodel = 'bilinear'\nyield_displacement = 0.01\nhardening = 0.1\ncolumns_per_storey = 6\n"
+        "[slave.a]\nkind = 'column'\n[slave.a.compensator]\nkind = 'ats'\nlead = 0.036\n"
+        "[slave.b]\nkind = 'column'\n[slave.b.column]\nmodel = 'linear'\n[slave.b.compensator]\nlead = 0.01\n"
+    )
+    found = parse(text, Path())
+    assert found.of("slave.a").compensator.parameters == {"lead": 0.036}
+    assert found.of("slave.a").column.parameters == {"yield_displacement": 0.01, "hardening": 0.1}
+    assert found.of("slave.b").column.parameters == {}
+    assert found.of("slave.b").column.columns_per_storey == 6
+    common = found.compensator.parameters
+    assert found.of("slave.b").compensator.parameters == common | {"lead": 0.01}
+
+
 def test_a_slaves_own_compensator_replaces_the_common_one_with_all_its_parameters() -> None:
     text = "[table.compensator]\nkind = 'taylor'\nlead = 0.01\n[slave.a.table.compensator]\nkind = 'none'\n[slave.b]\n"
     found = parse(text, Path())
