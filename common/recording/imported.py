@@ -197,6 +197,11 @@ class ImportedData:
         return {"data": self.data, **flags, **gaps, "channels": json.dumps(tables)}
 
 
+def is_static(run: Run) -> bool:
+    """Whether a recording holds imported rows whose times have no meaning."""
+    return run.metadata.get(IMPORT, {}).get("static") == "true"
+
+
 def imported(run: Run) -> ImportedData | None:
     """What an imported recording states, None for a recording of a test by rths itself.
 

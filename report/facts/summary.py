@@ -10,6 +10,7 @@ import numpy as np
 from common.errors import InputError
 from common.plan.plan import Plan
 from common.recording.holds import added, holds
+from common.recording.imported import is_static
 from common.recording.run import Run, Values
 from common.roles import LATENCY, MASTER, SLAVE, kind_of, latency_topic, name_of
 from laboratories.column.kind import COLUMN
@@ -121,10 +122,10 @@ def completeness(run: Run, topic: str, expected: int) -> dict[str, Any]:
 
 
 def peaks(run: Run) -> dict[str, dict[str, Any]]:
-    """Largest magnitude of every recorded quantity with a unit, and when it occurs."""
+    """Largest magnitude of every recorded quantity with a unit, and when it occurs: None where rows have no times."""
     result = {}
     for topic, columns in run.columns.items():
-        t = columns.get("t")
+        t = None if is_static(run) else columns.get("t")
         for name, unit in units_of(run, topic).items() if kind_of(topic) in (MASTER, SLAVE) else ():
             values = columns.get(name)
             if values is None or not values.size:
@@ -151,7 +152,7 @@ def tracking(run: Run, labs: list[LaboratoryFacts]) -> dict[str, dict[str, Any]]
     why.
     """
     result: dict[str, dict[str, Any]] = {}
-    for lab in labs:
+    for lab in [] if is_static(run) else labs:
         columns, late = run.columns[lab.topic], lab.late
         target, measured = lab.channels.target.name, lab.channels.position
         if not {target, measured, "t"} <= columns.keys() or columns["t"].size <= LEAST_TICKS:
@@ -185,7 +186,8 @@ def whereabouts(lab: LaboratoryFacts) -> str:
 
 def force_paths(run: Run, labs: list[LaboratoryFacts]) -> dict[str, dict[str, Any]]:
     """Delay (s) with its interval and gain of each column's force, which tracking does not show, by its system."""
-    found = ((system(lab, labs), force_path(run, lab)) for lab in labs if lab.channels == COLUMN.channels)
+    columns = [] if is_static(run) else [lab for lab in labs if lab.channels == COLUMN.channels]
+    found = ((system(lab, labs), force_path(run, lab)) for lab in columns)
     return {name: facts for name, facts in found if facts is not None}
 
 

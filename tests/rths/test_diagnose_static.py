@@ -41,6 +41,10 @@ def test_a_report_on_static_data_holds_no_times_and_no_effects_on_rates(
     imported = capsys.readouterr().out
     assert "680 rows without times" in imported
     assert not TIME.findall(imported)
+    assert call("inspect", recording) == 0
+    inspected = capsys.readouterr().out
+    assert not TIME.findall(inspected)
+    assert "force path" not in inspected
     assert call("diagnose", recording, "--json", out, "--html", html) == 0
     text = capsys.readouterr().out
     (named,) = re.findall(r"at the column: ([a-z+ ]+) closes", " ".join(text.split()))

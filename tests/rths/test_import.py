@@ -13,6 +13,7 @@ from common.recording.imported import LoggerFilter
 from common.recording.reader import read
 from diagnosis.recorded import slips
 from diagnosis.recorded.record import build
+from report.facts.summary import summarize
 from report.text.tabular import read_table
 from report.text.text_form import StatedForm, TextForm
 from tests.rths.imports import COMMAND, DRIVE, FORCE, LATE, PLAN, TIMES, known, table
@@ -96,6 +97,7 @@ def test_static_data_keep_their_rows_and_need_no_time(bring: Any) -> None:
     assert code == 0
     assert known(run).static
     assert run.ticks("master") == 400
+    assert {facts["t"] for facts in summarize(run)["peaks"].values()} == {None}
     assert not known(run).channel("master", "column_displacement").interpolated
 
 
