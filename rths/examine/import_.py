@@ -54,9 +54,10 @@ def run(args: argparse.Namespace) -> int:
         from report.text import tabular
         from rths.examine.importing.import_map import load_map
         from rths.examine.importing.onto_ticks import on_ticks
+        from rths.examine.importing.time_base import put_together
 
         mapping = load_map(args.map)
-        table = tabular.read_table(args.data, mapping.form)
+        table = put_together(mapping, tabular.read_table(args.data, mapping.form), args.data)
         found = on_ticks(mapping, table, args.data, as_is=args.as_is)
         ground, unread = ground_of(mapping, found)
         with outputs.writing(args.output, args.force, inputs) as path:

@@ -134,6 +134,25 @@ def test_a_channel_with_a_rate_of_its_own_has_empty_cells(bring: Any, case: str)
     assert [one.rate for one in channels] == pytest.approx([rate, 100.0])
 
 
+def test_rows_of_two_loggers_at_one_time_are_one_row(bring: Any, capsys: Any) -> None:
+    slow = TIMES[::3]
+    times = np.r_[TIMES, slow]
+    order = np.argsort(times, kind="stable")
+    motion = 5.0 * np.sin(2.0 * np.pi * 0.7 * times)
+    commanded, read = motion.copy(), motion.copy()
+    commanded[TIMES.size :], read[: TIMES.size] = np.nan, np.nan
+    rows = [column[order] for column in (times, commanded, read)]
+    code, run = bring(table("t,u,y", *rows).replace("nan", ""), DRIVE)
+    assert code == 0
+    ticks, found = run.columns["master"]["t"], run.columns["master"]["column_displacement"]
+    assert np.max(np.abs(found - 5e-3 * np.sin(2.0 * np.pi * 0.7 * ticks))[20:-20]) < 2e-7
+    assert known(run).channel("master", "column_displacement").rate == pytest.approx(100.0 / 3.0)
+    capsys.readouterr()
+    twice = [column[np.r_[0, 0, 1 : column.size]] for column in (TIMES, COMMAND, LATE)]
+    assert bring(table("t,u,y", *twice), DRIVE)[0] == 2
+    assert "does not increase at row 2" in capsys.readouterr().err
+
+
 def test_rows_where_one_of_two_loggers_has_not_begun_or_has_ended_are_left_out(
     bring: Any, capsys: Any
 ) -> None:

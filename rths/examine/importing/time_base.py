@@ -20,6 +20,34 @@ FOR_A_SPLINE = 4  # rows at least
 EVENLY = 1.5  # usual distances of a channel's own rows, from which on one is missing
 
 
+def put_together(mapping: ImportMap, table: DataTable, data: Path) -> DataTable:
+    """The data with one row for two of the same time, of two loggers in one file, that share no column with numbers.
+
+    Other rows of the same time stay, and are refused as times that do not increase.
+    """
+    if mapping.static or not mapping.time:
+        return table
+    t = pick(table, mapping.time, data)
+    first = np.flatnonzero(np.diff(t) == 0.0)
+    second = first + 1
+    others = [
+        column for name, column in table.columns.items() if name != mapping.time and column.size == t.size
+    ]
+    if np.isin(second, first).any() or any(
+        np.any(np.isfinite(column[first]) & np.isfinite(column[second])) for column in others
+    ):
+        return table
+
+    def one_row(column: Array) -> Array:
+        if column.size != t.size:
+            return column
+        whole = column.copy()
+        whole[first] = np.where(np.isfinite(column[first]), column[first], column[second])
+        return np.delete(whole, second)
+
+    return table._replace(columns={name: one_row(column) for name, column in table.columns.items()})
+
+
 def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, Any]:
     """Times of the rows that are read, s, and which rows those are; raises InputError where they do not increase."""
     counted = np.arange(length(mapping, table, data), dtype=np.float64) / (mapping.rate or 1.0)
