@@ -8,7 +8,7 @@ FAULT_TESTS := tests/faults tests/system/faults tests/system/test_recording_faul
 # the tests start hundreds of interpreters, which find this checkout compiled, whatever the user's shell says of bytecode
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup run test check slow faults soak matrix opensees fmi cluster docs site benchmark blind clean
+.PHONY: setup run test long check slow faults soak matrix opensees fmi cluster docs site benchmark blind clean
 
 setup: $(READY)
 
@@ -33,7 +33,12 @@ check: setup
 # worker computes while tests of another one wait for clocks and processes
 test: setup
 	$(BIN)/python -m simulation.warm
-	$(BIN)/pytest -n 3 --dist worksteal -m "not slow and not faults and not soak"
+	$(BIN)/pytest -n 3 --dist worksteal -m "not long and not slow and not faults and not soak"
+
+# whole diagnoses and trials of several seconds each, which give the same on any machine
+long: setup
+	$(BIN)/python -m simulation.warm
+	$(BIN)/pytest -n 3 --dist worksteal -m long
 
 # what takes long or needs a machine that does little else; one worker: where a test hangs beyond reach the others get another
 slow: setup

@@ -36,6 +36,7 @@ def plan_of(path: Path) -> Plan:
     return parse(read(path).metadata["plan"]["toml"], path.parent)
 
 
+@pytest.mark.long
 def test_a_diagnosis_that_is_read_as_a_reality_gives_the_same_laboratories(
     cases: Cases, tmp_path: Path
 ) -> None:

@@ -138,6 +138,7 @@ def play(case: Case, seed: int, folder: Path) -> Outcome:
     return Outcome(held.held(read(played), read(folder / "next.mcap")).inside, after / before)
 
 
+@pytest.mark.long
 def test_a_prediction_band_covers_its_stated_share_where_the_cause_was_found(tmp_path: Path) -> None:
     outcome = play(FOUND["actuator delay, half"], 5, tmp_path)
     assert 0.85 <= outcome.inside <= 0.95

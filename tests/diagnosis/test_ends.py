@@ -40,6 +40,7 @@ def test_an_end_that_bends_is_spoilt_and_a_motion_is_not() -> None:
     assert not edges.spoilt(np.random.default_rng(2).standard_t(3, TIME.size)).all()
 
 
+@pytest.mark.long
 def test_ends_of_a_resampled_reading_are_left_out(cases: Cases) -> None:
     found = examine(put_right(imported(cases.record(), resampled)))
     assert "damper_stroke" in found.record.edges

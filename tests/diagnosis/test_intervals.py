@@ -109,6 +109,7 @@ def test_an_interval_leaves_room_for_another_formula(cases: Cases) -> None:
     assert given.high == pytest.approx(item.outward(place + half), rel=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("limit", [60.0, 120.0])
 def test_a_level_that_a_reading_does_not_go_beyond_is_as_wide_as_formulas_differ(
     cases: Cases, limit: float
@@ -137,6 +138,7 @@ def test_a_limit_at_which_a_machine_bends_is_as_wide_as_formulas_differ(cases: C
         assert between_formulas(fit, free) == pytest.approx(wide)
 
 
+@pytest.mark.long
 def test_the_interval_of_an_unreached_level_holds_that_of_another_formula(cases: Cases) -> None:
     name = "sensor.damper_force.saturation"
     whole = cases.record({name: {"limit": 60.0, "sharpness": 3.0}}, duration=8.0)

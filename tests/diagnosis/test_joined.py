@@ -76,6 +76,7 @@ def test_recordings_of_other_laboratories_are_refused(records: tuple[Record, Rec
         refuse_others(first, [replace(second, plan=stiffer)])
 
 
+@pytest.mark.long
 def test_a_second_recording_narrows_the_confidence_interval(cases: Cases) -> None:
     first, second = (cases.record(FRICTION, duration=4.0, scale=scale) for scale in (0.1, 0.2))
     widths = []

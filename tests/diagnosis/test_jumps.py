@@ -53,6 +53,7 @@ def test_the_jumps_of_a_zero_are_found() -> None:
     assert found.white == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.long
 def test_a_reading_that_loses_counts_is_an_unknown_effect_of_it(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
     read, lost = whole.signals[NAME].copy(), 1.5 * whole.planned_noise[NAME]

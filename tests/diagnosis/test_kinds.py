@@ -51,6 +51,7 @@ def named(report: Report) -> tuple[str, ...]:
     return report.which[0].effects
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("lab", "said"), [("master", "master"), ("slave.east", "slave 'east'")])
 def test_the_yielding_one_of_two_columns_is_named(lab: str, said: str, tmp_path: Path) -> None:
     report = diagnosed(TWO, tmp_path, {**YIELDING, "laboratory": lab})["east"]
@@ -62,6 +63,7 @@ def test_the_yielding_one_of_two_columns_is_named(lab: str, said: str, tmp_path:
     assert {"master.column.stiffness", "slave.east.actuator.delay"} <= report.tolerances.keys()
 
 
+@pytest.mark.long
 def test_a_test_without_slaves_gives_one_report(tmp_path: Path) -> None:
     reports = diagnosed(SINGLE, tmp_path, {"name": "actuator.delay", "delay": 0.004})
     assert list(reports) == [""]
@@ -70,6 +72,7 @@ def test_a_test_without_slaves_gives_one_report(tmp_path: Path) -> None:
     assert boxes(reports[""]) == ["ground", "structure", "actuator", "column"]
 
 
+@pytest.mark.long
 def test_a_master_without_a_rig_gives_a_report_per_slave(tmp_path: Path) -> None:
     delay, friction = {"name": "actuator.delay", "delay": 0.004}, {"name": "damper.friction", "force": 3.0}
     reports = diagnosed(NO_RIG, tmp_path, delay, friction)
@@ -81,6 +84,7 @@ def test_a_master_without_a_rig_gives_a_report_per_slave(tmp_path: Path) -> None
     assert boxes(reports["dampers"]) == ["ground", "structure", "link", "table", "damper"]
 
 
+@pytest.mark.long
 def test_a_hidden_effect_of_a_users_device_is_named(tmp_path: Path) -> None:
     report = diagnosed(OWN, tmp_path, {"name": "device.leak", "share": 0.2})[""]
     assert named(report) == ("device.leak",)
@@ -94,6 +98,7 @@ def test_a_test_that_is_as_planned_has_no_gap(tmp_path: Path) -> None:
     assert diagnosed(TWO, tmp_path)["east"].status == "no_gap"
 
 
+@pytest.mark.long
 def test_the_diagram_colours_the_part_and_the_reading_of_the_laboratory_that_has_the_gap(
     tmp_path: Path,
 ) -> None:

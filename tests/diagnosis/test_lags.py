@@ -15,6 +15,7 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
     return Cases(tmp_path_factory, STRONGEST)
 
 
+@pytest.mark.long
 def test_a_servo_loop_of_second_order_is_named_with_its_damping(cases: Cases) -> None:
     effect, values = "actuator.time_constant", {"factor": 1.2, "law": 1.0, "damping": 0.6}
     report = cases.report({effect: values})
@@ -24,6 +25,7 @@ def test_a_servo_loop_of_second_order_is_named_with_its_damping(cases: Cases) ->
     assert estimate(report, effect, "damping") == pytest.approx(0.6, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("effect", "time_constant", "damping"),
     [("damper.motor_lag", 0.008, 0.6), ("sensor.column_force.lag", 0.012, 0.7)],
@@ -39,6 +41,7 @@ def test_a_lag_of_second_order_is_named_with_its_damping(
     assert estimate(report, effect, "damping") == pytest.approx(damping, rel=0.15)
 
 
+@pytest.mark.long
 def test_a_filter_that_only_delays_stands_beside_the_delay_that_does_the_same(cases: Cases) -> None:
     late = {"time_constant": 0.006, "law": 1.0, "damping": 0.7}
     report = cases.report({"sensor.column_force.lag": late})

@@ -108,6 +108,7 @@ class Endochronic(Driven):
         self.measured = (force + NOISE * np.random.default_rng(2).standard_normal(TICKS))[:, None]
 
 
+@pytest.mark.long
 def test_an_endochronic_column_is_yielding_by_that_law() -> None:
     (found,) = in_best_laws([first_law(Endochronic())])
     values = found.values["column.yielding"]
@@ -126,6 +127,7 @@ def test_the_recording_with_the_largest_deformation_starts_the_fit_of_a_law() ->
     assert path(MadeSpecimen()) is None
 
 
+@pytest.mark.long
 def test_the_right_law_is_selected_with_the_columns_parameters() -> None:
     before = first_law()
     (found,) = in_best_laws([before])

@@ -84,6 +84,7 @@ def played(plan: Plan, path: Path, **options: float) -> Run:
 # -- what is found --------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_the_parameters_of_an_impaired_link_are_found_over_a_grid() -> None:
     errors: dict[str, list[float]] = {}
     inside: dict[str, list[bool]] = {}

@@ -148,12 +148,14 @@ def test_a_drift_is_not_taken_for_slow_noise(drifting: Search) -> None:
     assert found.chosen.values["sensor.column_displacement.drift"]["rate"] == pytest.approx(3e-6, rel=0.15)
 
 
+@pytest.mark.long
 def test_slow_noise_is_not_taken_for_a_drift(cases: Cases) -> None:
     whole = cases.record()
     noise = signal.lfilter([1.0], [1.0, -0.95], white(23, whole.ticks))
     assert in_column(whole, 5e-6 * noise).chosen.names == ()
 
 
+@pytest.mark.long
 def test_a_motion_in_several_readings_is_not_taken_for_pickup(cases: Cases) -> None:
     whole = cases.record()
     motion = 2e-5 * np.sin(2.0 * np.pi * 11.3 * whole.time)

@@ -44,6 +44,7 @@ def outcomes(found: Diagnosis) -> dict[str, str]:
     return {verdict.search.data.part.name: verdict.outcome for verdict in found.verdicts}
 
 
+@pytest.mark.long
 def test_a_gain_of_all_channels_within_their_calibration_is_said(cases: Cases) -> None:
     found = examine(imported(cases.record(), lambda read: 1.012 * read))
     told = [text for text in found.warnings if text.startswith("The readings")]
@@ -51,6 +52,7 @@ def test_a_gain_of_all_channels_within_their_calibration_is_said(cases: Cases) -
     assert not any("larger" in text for text in examine(imported(cases.record())).warnings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("effect", "early"), [({}, 4e-4), ({"table.bandwidth": {"factor": 1.3}}, 0.0)])
 def test_readings_that_are_early_by_less_than_an_interval_are_those_of_a_logger(
     effect: dict[str, dict[str, float]], early: float, cases: Cases
@@ -76,6 +78,7 @@ def test_a_hum_far_above_the_noise_is_no_gap(cases: Cases) -> None:
     assert lines == {50.0}
 
 
+@pytest.mark.long
 def test_an_effect_keeps_its_name_beside_a_loud_hum(cases: Cases) -> None:
     found = examine(imported(cases.record(FRICTION), hum))
     assert next(item.effects for item in found.verdicts if item.effects) == ("column.friction",)
@@ -115,6 +118,7 @@ def test_a_reading_without_a_gap_may_be_as_loud_beside_an_effect_on_another_one(
     assert not settling.louder(beside, replace(bare, undoubted=beside.white))
 
 
+@pytest.mark.long
 def test_loud_noise_that_may_follow_the_motion_is_too_few_data_where_inputs_cannot_be_asked(
     cases: Cases,
 ) -> None:

@@ -41,6 +41,7 @@ def test_noise_that_shakes_a_whole_table_is_none_of_its_accelerometer(cases: Cas
     assert [item.effect for item in noise.readings] == ["sensor.table_acceleration.noise"]
 
 
+@pytest.mark.long
 def test_an_inertia_that_a_restless_command_hides_in_noise_is_found(cases: Cases) -> None:
     whole = cases.record(scale=0.02, duration=4.0)
     part = lab_a(whole)

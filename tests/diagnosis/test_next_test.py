@@ -74,6 +74,7 @@ def test_proposed_tests_stay_within_the_reached_range_or_state_that_they_exceed_
     assert part.inputs["actuator_command"] is not None  # the recording's own are as they were
 
 
+@pytest.mark.long
 def test_an_unambiguous_explanation_needs_no_further_test(cases: Cases) -> None:
     report = cases.report({"column.friction": {"force": 900.0}})
     assert report["equivalent"] == []
@@ -81,6 +82,7 @@ def test_an_unambiguous_explanation_needs_no_further_test(cases: Cases) -> None:
     assert report["details"]["next"] == []
 
 
+@pytest.mark.long
 def test_candidates_that_no_motion_separates_lead_to_the_advice_to_check_the_sensor(cases: Cases) -> None:
     report = cases.report({"column.stiffness": {"factor": 1.1}})
     assert "check the sensor" in report["next_test"]

@@ -29,6 +29,7 @@ def disturbed(whole: Record, size: float, *names: str) -> Record:
     return replace(whole, signals=signals)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("size", "status", "told"),
     [(700.0, "unknown_effect", 1), (20.0, "within_tolerances", 1), (4.0, "within_tolerances", 0)],

@@ -37,6 +37,7 @@ def test_all_parameters_may_be_off_as_chance_has_them_or_one_alone(names: tuple[
     assert worth.strained(bare(3.0, names=names))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("z", "warned"), [(2.0, False), (2.9, True)])
 def test_a_parameter_that_is_rarely_as_far_off_is_told_and_not_named(
     tmp_path: Path, z: float, warned: bool

@@ -25,6 +25,7 @@ def found_in(whole: Record) -> list[SensorFinding]:
     return readings.findings(whole, readings.levels(datas), steps, readings.resolutions(whole, steps))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("signal", "step"),
     [("damper_force", 2.0), ("column_displacement", 5e-5), ("column_force", 1000.0), ("damper_stroke", 1e-4)],
@@ -52,6 +53,7 @@ def test_a_noisy_reading_is_found_with_its_noise_level(cases: Cases, signal: str
     assert found.interval[0] < found.value < found.interval[1]
 
 
+@pytest.mark.long
 def test_sensors_as_planned_give_no_finding(cases: Cases) -> None:
     for seed in (0, 1, 2):
         whole = cases.record(seed=seed, duration=8.0)

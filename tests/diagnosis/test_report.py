@@ -104,6 +104,7 @@ def shows_on_a_page(report: dict[str, Any]) -> None:
     assert not any(word in text for word in ('src="http', 'href="http', "@import", "<script src"))
 
 
+@pytest.mark.long
 def test_a_report_depends_on_the_recording_and_not_on_the_name_of_its_file(
     cases: Cases, tmp_path: Path
 ) -> None:
@@ -124,6 +125,7 @@ def test_a_report_depends_on_the_recording_and_not_on_the_name_of_its_file(
         assert "seed" not in text.lower()
 
 
+@pytest.mark.long
 def test_a_report_does_not_depend_on_earlier_diagnoses(cases: Cases) -> None:
     first = diagnose_file(cases.file(KINDS["reading"], duration=8.0)).plain()
     diagnose_file(cases.file(KINDS["link"], duration=8.0))

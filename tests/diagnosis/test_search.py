@@ -102,6 +102,7 @@ def test_an_effect_that_shows_under_loud_noise_gives_way_to_a_far_likelier_one_i
     assert searching.one_by_one(bare, Sizes())[1][0].names == (leads,)
 
 
+@pytest.mark.long
 def test_an_effect_that_acts_in_one_second_only_is_found_with_no_second_withheld(cases: Cases) -> None:
     effects = {"actuator.velocity_limit": {"velocity": 0.025}}
     report = cases.report(effects, duration=SECONDS)  # 32 mm/s in the third, 21 elsewhere
@@ -111,6 +112,7 @@ def test_an_effect_that_acts_in_one_second_only_is_found_with_no_second_withheld
     assert report["how_far"]["closed"] > 0.9
 
 
+@pytest.mark.long
 def test_a_valve_whose_speed_falls_with_the_load_is_found(cases: Cases) -> None:
     name = "actuator.velocity_limit"
     report = cases.report({name: {"velocity": 0.02, "law": 2.0, "stall": 5e4}})
@@ -161,6 +163,7 @@ def test_a_clean_laboratory_gives_no_effect(cases: Cases, seed: int) -> None:
 LATE = "sensor.column_force.delay"
 
 
+@pytest.mark.long
 def test_a_delayed_force_reading_is_found_with_its_delay_in_the_verdict_and_the_force_path(
     cases: Cases,
 ) -> None:
@@ -173,6 +176,7 @@ def test_a_delayed_force_reading_is_found_with_its_delay_in_the_verdict_and_the_
     assert path["interval"][0] <= 0.002 <= path["interval"][1]
 
 
+@pytest.mark.long
 def test_a_short_delay_and_a_lag_of_the_same_size_are_reported_as_equivalent(cases: Cases) -> None:
     report = cases.report({LATE: {"delay": 0.0006}})
     assert [LATE, "sensor.column_force.lag"] in [sorted(names) for names in report["equivalent"]]
@@ -193,6 +197,7 @@ def test_an_effect_that_was_found_first_changes_its_law_beside_a_second_one(case
     assert estimate(report, "actuator.deadband", "width") == pytest.approx(4e-4, rel=0.05)
 
 
+@pytest.mark.long
 def test_effects_that_may_stand_for_another_are_looked_at_under_all_their_laws(cases: Cases) -> None:
     whole = cases.record(LEAKY)
     data, scales = residuals.prepare(lab_a(whole), whole), Scales(whole)
@@ -202,6 +207,7 @@ def test_effects_that_may_stand_for_another_are_looked_at_under_all_their_laws(c
     assert fitting.excess(best) < 1e-3 * fitting.excess(wrong)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("true", ["column.stiffness", "sensor.column_force.gain"])
 def test_effects_that_the_signals_cannot_tell_apart_are_reported_together(cases: Cases, true: str) -> None:
     report = cases.report({true: {"factor": 1.1}})
@@ -253,6 +259,7 @@ LINKS: dict[str, Effects] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", LINKS)
 def test_an_impaired_link_is_found_and_nothing_else(cases: Cases, kind: str) -> None:
     report = cases.report(LINKS[kind], duration=8.0)
@@ -273,6 +280,7 @@ def test_a_reading_that_saturates_is_also_looked_for_above_what_was_reached(case
     assert min(limits) < peak < 2.0 * peak < max(limits)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("effect", "motion"),
     [("actuator.backlash", "column_displacement"), ("table.backlash", "table_displacement")],
@@ -381,6 +389,7 @@ def test_a_force_that_stands_still_is_looked_for_far_beyond_what_the_motion_make
     assert found.values["force"] == pytest.approx(-2.0, rel=0.1)
 
 
+@pytest.mark.long
 def test_an_effect_is_found_that_shows_most_in_the_seconds_that_a_fit_sees(cases: Cases) -> None:
     effects = {"sensor.damper_force.saturation": {"limit": 55.0, "sharpness": 6.0}}
     whole = cases.record(effects, duration=8.0)

@@ -45,6 +45,7 @@ def test_a_signal_of_less_than_its_noise_does_not_pay_for_what_another_one_misse
     assert excess(left(0.5, 1.2)) > 300.0
 
 
+@pytest.mark.long
 def test_an_effect_beside_three_is_found_by_the_nominal_parameter_that_stands_in_for_it(cases: Cases) -> None:
     whole = cases.record(FOUR, seed=0)
     data, scales = residuals.prepare(lab_a(whole), whole), Scales(whole)

@@ -41,6 +41,7 @@ def leaving(verdict: PartVerdict) -> PartVerdict:
     return replace(verdict, search=replace(verdict.search, chosen=left))
 
 
+@pytest.mark.long
 def test_what_is_left_in_a_part_says_nothing_against_an_effect_of_another_part(found: Diagnosis) -> None:
     a, b = part(found, "laboratory A"), part(found, "laboratory B")
     assert a.effects

@@ -17,6 +17,7 @@ NAME = "sensor.damper_stroke.saturation"
 SHARPNESS = 3.4  # between those at which it is looked for
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("farther", "erring"), [(3.5, MODEL_ERROR), (6.0, FINE_ERROR)])
 def test_a_scale_that_bends_far_above_what_is_reached_is_named(
     farther: float, erring: float, cases: Cases

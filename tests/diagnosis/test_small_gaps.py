@@ -36,6 +36,7 @@ def lagging(whole: Record, share: float, place: int = STROKE) -> LaboratoryPart:
     return part.replaced(measured=measured, candidates=())  # none of which is its cause
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("share", "outcome"), [(0.0, "tolerances"), (WIDTH, "unknown")])
 def test_a_gap_that_two_good_solutions_may_differ_by_is_seen(
     share: float, outcome: str, cases: Cases
@@ -49,6 +50,7 @@ def test_a_gap_that_two_good_solutions_may_differ_by_is_seen(
     assert judge(found).outcome == outcome
 
 
+@pytest.mark.long
 def test_so_small_a_gap_is_not_looked_for_behind_a_filter(cases: Cases) -> None:
     whole = cases.record({}, duration=8.0)
     part = lagging(whole, WIDTH)
@@ -89,6 +91,7 @@ def test_so_small_a_gap_is_not_looked_for_behind_a_converter_that_may_take_its_c
     assert fine.erring == (MODEL_ERROR if rate > 500.0 else FINE_ERROR)
 
 
+@pytest.mark.long
 def test_a_gap_that_the_inputs_foresee_is_seen_below_what_its_energy_tells(cases: Cases) -> None:
     whole = cases.record({}, duration=8.0)
     data = residuals.prepare(lagging(whole, FAINT, TABLE), whole)
@@ -98,6 +101,7 @@ def test_a_gap_that_the_inputs_foresee_is_seen_below_what_its_energy_tells(cases
     assert judge(search(data, Scales(whole))).outcome == "unknown"
 
 
+@pytest.mark.long
 def test_the_name_of_so_small_a_gap_is_half_as_probable(cases: Cases) -> None:
     whole = cases.record({"column.friction": {"force": 900.0}}, duration=8.0)
     found = search(residuals.prepare(lab_a(whole), whole), Scales(whole))

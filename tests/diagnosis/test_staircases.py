@@ -64,6 +64,7 @@ def test_a_wrong_gain_of_a_motion_that_mostly_rests_is_no_staircase(cycles: int)
     assert staircase(predicted, -0.07 * predicted + noise) is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rms", [5e-5, 2e-4])
 @pytest.mark.parametrize("fault", ["noise", "quantization"])
 def test_the_fault_of_a_sensor_is_told_behind_a_loggers_noise(cases: Cases, fault: str, rms: float) -> None:

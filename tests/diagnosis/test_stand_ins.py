@@ -131,6 +131,7 @@ def test_a_factor_that_is_less_than_solutions_differ_by_is_no_cause(factor: floa
     assert trifling(Search(DATA, fit(NOISY + 10.0 * GAP), chosen, ())) != named
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("factor", "outcome"), [(1.005, "unknown"), (1.05, "explained")])
 def test_a_gain_of_a_reading_within_tolerances_may_be_its_machine(
     cases: Cases, factor: float, outcome: str
@@ -308,6 +309,7 @@ def test_noise_of_several_readings_that_follows_from_one_motion_is_an_unknown_ef
     assert where.culprits(found.search.chosen) == ("table",)
 
 
+@pytest.mark.long
 def test_noise_that_follows_from_one_motion_is_an_unknown_effect_beside_one_with_a_name(cases: Cases) -> None:
     effect = {"table.gain": {"factor": 1.1}}
     whole = cases.record(effect)
@@ -359,6 +361,7 @@ def test_an_unknown_effect_in_one_part_does_not_hide_the_name_of_another(
     )
 
 
+@pytest.mark.long
 def test_an_effect_whose_size_lies_at_the_end_of_its_range_explains_in_part_only(cases: Cases) -> None:
     whole = cases.record({"actuator.gain": {"factor": 0.9}}, duration=8.0)
     found = search(residuals.prepare(lab_a(whole), whole), Scales(whole, 0.0))

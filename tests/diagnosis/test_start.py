@@ -46,6 +46,7 @@ def test_another_difference_is_no_start(read: np.ndarray) -> None:
     assert start.least(read, GROUND, THERE) is None
 
 
+@pytest.mark.long
 def test_a_logger_that_begins_between_two_ticks_shifts_no_ground(cases: Cases) -> None:
     found = examine(put_right(begun_late(imported(cases.record()), 0.3, 2e-5)))
     assert found.record.start is not None
@@ -54,6 +55,7 @@ def test_a_logger_that_begins_between_two_ticks_shifts_no_ground(cases: Cases) -
     assert [text for text in found.warnings if "the time at which the data logger began" in text]
 
 
+@pytest.mark.long
 def test_a_ground_motion_that_is_late_by_more_than_an_interval_is_named(cases: Cases) -> None:
     shifted = {"ground.time_shift": {"shift": 0.01}}
     found = examine(put_right(imported(cases.record(shifted))))

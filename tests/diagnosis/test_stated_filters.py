@@ -63,6 +63,7 @@ def report(whole: Record) -> Report:
     return diagnose({"slave": whole}, {})["slave"].report
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", PASSED)
 def test_a_laboratory_behind_a_filter_that_is_not_quite_the_stated_one_has_no_fault(
     name: str, cases: Cases
@@ -71,6 +72,7 @@ def test_a_laboratory_behind_a_filter_that_is_not_quite_the_stated_one_has_no_fa
     assert (found.status, found.where) == ("within_tolerances", ())
 
 
+@pytest.mark.long
 def test_a_fault_is_found_behind_a_digital_filter(cases: Cases) -> None:
     rubbing = cases.record({"column.friction": {"force": 900.0}})
     whole = behind(rubbing, *PASSED["digital"])

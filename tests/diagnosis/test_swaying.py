@@ -46,6 +46,7 @@ def loosening(whole: Record, name: str) -> Record:
     return replace(whole, signals=whole.signals | {name: read + error})
 
 
+@pytest.mark.long
 def test_a_gain_that_sways_is_an_effect_of_its_reading(cases: Cases) -> None:
     found = diagnose({"slave": loosening(cases.record(duration=8.0), "damper_force")}, {})["slave"].report
     assert (found.status, [place.site for place in found.where]) == (

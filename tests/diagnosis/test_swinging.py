@@ -106,6 +106,7 @@ def test_a_laboratory_in_which_nothing_swings_has_no_resonance(cases: Cases) -> 
         assert resonant(fit) is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("frequency", [3.1, 0.8])  # of a frame, of liquid in a tank
 def test_a_mass_that_swings_on_the_table_is_named_where_it_looked_like_noise(
     cases: Cases, frequency: float
@@ -116,6 +117,7 @@ def test_a_mass_that_swings_on_the_table_is_named_where_it_looked_like_noise(
     assert verdict.effects == ("table.second_mass",)
 
 
+@pytest.mark.long
 def test_what_swings_beside_a_name_leaves_that_partly_explained(cases: Cases) -> None:
     whole = cases.record({"column.inertia": {"mass": 5000.0}}, duration=12.0)
     part = with_a_fixture(whole, 300.0)
@@ -130,6 +132,7 @@ def test_what_swings_beside_a_name_leaves_that_partly_explained(cases: Cases) ->
     assert "swings for many periods" in swinging(verdict)[0]
 
 
+@pytest.mark.long
 def test_a_mass_that_does_not_swing_is_explained(cases: Cases) -> None:
     whole = cases.record({"column.inertia": {"mass": 5000.0}}, duration=12.0)
     found = search(residuals.prepare(lab_a(whole), whole), Scales(whole))

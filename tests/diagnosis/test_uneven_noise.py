@@ -51,6 +51,7 @@ def test_noise_that_follows_the_motion_is_an_effect_of_its_reading(name: str, ca
     assert not found.details.learned
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.5, 1.0])
 def test_a_clock_that_is_early_by_chance_is_no_delay_and_no_effect_of_the_table(
     share: float, cases: Cases
@@ -153,6 +154,7 @@ def test_what_a_model_errs_by_does_not_count() -> None:
     assert none.ratio == 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("follows", [True, False])
 def test_loud_noise_beside_an_effect_is_its_sensors_only_where_it_is_steady(
     follows: bool, cases: Cases

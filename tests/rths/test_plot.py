@@ -59,6 +59,7 @@ def test_without_a_ground_motion_the_caption_names_only_the_test() -> None:
     assert plot.caption(run, SLAVE) == "test"
 
 
+@pytest.mark.long
 def test_named_pictures_are_drawn_and_no_others(call: Any, virtual_recording: Path, tmp_path: Path) -> None:
     assert call(virtual_recording, "-o", tmp_path / "some", "spectra", "tracking", "spectra") == 0
     assert {path.name for path in (tmp_path / "some").iterdir()} == {"spectra.png", "tracking.png"}
@@ -75,6 +76,7 @@ def test_one_picture_goes_into_a_file_of_its_format(
     assert next(path.parent.iterdir()).read_bytes().startswith(head)
 
 
+@pytest.mark.long
 def test_pictures_that_are_left_out_are_named_in_json_only(
     call: Any, capsys: Any, virtual_recording: Path, tmp_path: Path
 ) -> None:
@@ -124,6 +126,7 @@ def test_the_help_states_what_to_look_for_in_each_picture(call: Any, capsys: Any
         assert f"{name} {picture.text}" in shown
 
 
+@pytest.mark.long
 def test_imported_measurements_are_drawn_as_far_as_they_go(call: Any, tmp_path: Path) -> None:
     examples = ROOT / "examples" / "real_data"
     data, cut = examples / "force_rig.csv", tmp_path / "map.toml"

@@ -83,6 +83,7 @@ def test_replay_finds_one_changed_bit_of_one_slave(call: Any, recording: Path, m
     assert matches["master/damper_force_used.roof"].differing == 0
 
 
+@pytest.mark.long
 def test_plot_draws_each_laboratory_under_its_name(
     call: Any, capsys: Any, recording: Path, tmp_path: Path
 ) -> None:
@@ -234,6 +235,7 @@ def test_bench_requires_a_slaves_name_for_its_parts_and_identify_finds_them(
     assert parts["damper.cellar"]["parameters"]["mass"]["value"] == pytest.approx(20.0, rel=0.05)
 
 
+@pytest.mark.long
 def test_a_diagnosis_names_the_laboratory_with_the_gap(
     two: Plan, call: Any, capsys: Any, tmp_path: Path
 ) -> None:

@@ -44,6 +44,7 @@ def trial_of(name: str) -> TrialBasis:
     return basis(plans.load(cli.plan_path(name)), 2.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES, ids=lambda name: Path(name).stem)
 def test_effects_are_hidden_in_every_laboratory_and_every_case_can_be_built(name: str) -> None:
     cases = draw(24, 1, "judge", trial=trial_of(name))

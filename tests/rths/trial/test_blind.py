@@ -141,6 +141,7 @@ def test_the_recorded_size_is_that_of_the_effect(tmp_path: Path) -> None:
     assert record(clean, tmp_path).sizes == ()
 
 
+@pytest.mark.long
 def test_the_diagnosing_process_sees_recordings_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RTHS_TRUTH", "damper.friction")
     found = {item.name for item in record_all(cases(2), tmp_path)}
@@ -165,6 +166,7 @@ def test_a_failing_diagnosis_does_not_affect_the_other_cases(tmp_path: Path) -> 
         diagnose_all(tmp_path, diagnosis="rths.nowhere:x")
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("inside")
 def test_the_next_test_of_every_case_is_predicted_and_judged(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -199,6 +201,7 @@ def test_the_next_test_of_every_case_is_predicted_and_judged(
         assert {path.name for path in kept.iterdir()} >= {"found.toml", "found.npz", "predicted.mcap"}
 
 
+@pytest.mark.long
 def test_a_next_test_is_the_same_every_time_and_a_failed_prediction_counts(tmp_path: Path) -> None:
     trial = basis(duration=1.5, library=LIBRARY)
     (case,) = cases(1, "catalogue")
@@ -218,6 +221,7 @@ def test_the_goal_of_a_mean_share_is_judged_by_its_interval() -> None:
     assert predictions.share_inside([0.7, 1.0]).passed is None
 
 
+@pytest.mark.long
 def test_the_command_scores_the_cases_and_keeps_the_results(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -238,6 +242,7 @@ def test_the_command_scores_the_cases_and_keeps_the_results(
         assert read(folder / "recording.mcap").finished
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("inside")
 def test_single_cases_of_a_set_are_the_same_as_among_all(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -324,6 +329,7 @@ def test_a_missing_package_gives_one_sentence(
     )
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("inside")
 def test_a_trial_goes_on_where_it_was_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     words = ("--cases", "2", "--only", "clean", "--duration", "1.5", "--diagnosis", f"{HERE}:no_gap")

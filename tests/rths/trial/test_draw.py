@@ -68,6 +68,7 @@ def draw(count: int, seed: int, set_: str, *, duration: float = 30.0, **asked: A
     return draw_of(count, seed, set_, trial=replace(TRIAL, library=library, duration=duration), **asked)
 
 
+@pytest.mark.long
 def test_a_case_does_not_depend_on_the_number_of_cases() -> None:
     few, many = draw(3, 5, "judge"), draw(12, 5, "judge")
     assert many[:3] == few
@@ -214,6 +215,7 @@ def begun(shipped: TrialBasis) -> list[Beginning]:
     return [begin(index, 2026, "judge", shipped.library) for index in range(CASES)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("added", [MADE_UP, OF_READING], ids=["physics", "reading"])
 def test_an_added_effect_does_not_change_the_cases_of_other_effects(
     added: Effect, shipped: TrialBasis, begun: list[Beginning]

@@ -245,6 +245,7 @@ effects = [{{ name = "x.table.pitch", parameters = {{ coupling = 0.1, frequency 
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("by_file", [True, False])
 def test_a_test_in_virtual_time_runs_with_the_independent_laboratories(
     by_file: bool, monkeypatch: Any, capsys: Any, tmp_path: Path, virtual_recording: Path
@@ -269,6 +270,7 @@ def test_a_test_in_virtual_time_runs_with_the_independent_laboratories(
     assert 0.002 < np.std(gap) / np.std(nominal["column_displacement"]) < 0.5
 
 
+@pytest.mark.long
 def test_a_test_with_clean_independent_laboratories_has_no_gap(
     monkeypatch: Any, tmp_path: Path, virtual_recording: Path
 ) -> None:

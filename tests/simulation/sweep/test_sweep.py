@@ -97,6 +97,7 @@ def test_the_peaks_of_a_sweep_are_the_largest_magnitudes(name: str) -> None:
     assert limited.peaks(plan, columns) == {name: float(np.max(values)) for name, values in every.items()}
 
 
+@pytest.mark.long
 def test_one_worker_two_workers_and_a_resumed_sweep_give_the_same_bytes(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
