@@ -148,7 +148,8 @@ class RecordingGaps:
             recorded = self.record.signals[name][there]
             error = recorded - known[name][there]
             level = float(np.mean(recorded**2)) if recorded.size else 0.0
-            result[name] = float(np.sqrt(np.mean(error**2) / level)) if level > 0.0 else 0.0
+            with np.errstate(over="ignore"):  # of a simulation that diverges
+                result[name] = float(np.sqrt(np.mean(error**2) / level)) if level > 0.0 else 0.0
         return result
 
     def between(self, one: Mapping[str, Array] | None, other: Mapping[str, Array] | None) -> float:

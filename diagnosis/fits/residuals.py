@@ -206,11 +206,12 @@ class Data:
 
     def reduced(self, system: System) -> Array:
         """Residuals in σ averaged over groups, (groups, signals), each of unit variance for white noise."""
-        try:
-            raw = self.residual(system) / self.sigma
-        except InputError:  # a hypothesis that this plan's model cannot have
-            return np.full((self.groups, self.sigma.size), FAR)
-        return self.whitened(raw)
+        with np.errstate(over="ignore", invalid="ignore"):  # of one that diverges
+            try:
+                raw = self.residual(system) / self.sigma
+            except InputError:  # a hypothesis that this plan's model cannot have
+                return np.full((self.groups, self.sigma.size), FAR)
+            return self.whitened(raw)
 
     @cached_property
     def energy(self) -> float:

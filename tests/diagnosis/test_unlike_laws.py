@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
+from laboratories.effects import CATALOGUE
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_b
 from tests.diagnosis.test_equivalents import DATA, NOISY
@@ -34,6 +36,18 @@ def test_a_law_that_bends_is_named_with_its_shape(name: str, hidden: dict[str, f
     assert found.names == (name,)
     for parameter, value in hidden.items():
         assert found.values[name][parameter] == pytest.approx(value, rel=0.15)
+
+
+def test_a_spring_that_lets_the_mass_go_leaves_far_residuals_and_no_warning(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    data = residuals.prepare(lab_b(whole), whole)
+    for stiffening in (-400.0, -4e5):
+        system = CATALOGUE[SPRING].apply(data.system, factor=1.0, law=1.0, stiffening=stiffening)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            reduced = data.reduced(system)
+        assert np.all(np.isfinite(reduced))
+    assert np.max(np.abs(reduced)) == pytest.approx(residuals.FAR)
 
 
 @pytest.mark.parametrize(
