@@ -182,11 +182,14 @@ def by_two(bare: Fit, first: list[Fit], scales: Scales) -> list[Fit]:
     """Fits with one effect, best first, behind one with two where one alone explains too little and two nearly all.
 
     Two faults of one machine may halve what is left each, so that neither is worth it by itself. `first` are the fits
-    with one effect, best first.
+    with one effect, best first. Further laws are fitted only where first laws come near.
     """
     if not first or bare.data.part.exact or worth.is_worth(bare, bare, first[0]):
         return first
     if excess(first[0]) > (1.0 - STEP_OF_LEFT) * excess(bare):
+        return first
+    near = candidates.extended(first[0], scales)
+    if not near or excess(near[0]) > worth.HALF * excess(bare):
         return first
     both = candidates.best_laws(first[0], scales)
     if not both or excess(both[0]) > (1.0 - worth.NEARLY_ALL) * excess(bare):

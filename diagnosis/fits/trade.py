@@ -221,12 +221,14 @@ def in_further_laws(fit: Fit, first: Sequence[Fit]) -> list[Fit]:
 
 
 def under_unlike(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:
-    """Single effects under laws that no first law is like, in the place of one that leaves something.
+    """Single effects under laws that no first law is like, in the place of one that follows a gap and leaves something.
 
     A search looks at such laws only where no first law promises much: a soft end stop promises nearly all of what a
     spring does that stiffens with its stroke.
     """
-    if len(fit.names) != 1 or not leaves(fit) or fit.data.part.exact:
+    if len(fit.names) != 1 or fit.data.part.exact or not leaves(fit):
+        return []
+    if excess(fit) > FOLLOWED * excess(bare):
         return []
     other = fitting.at(fit.data, bare.values, bare.z)
     found = [

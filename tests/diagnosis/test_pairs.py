@@ -218,6 +218,7 @@ def test_two_effects_that_halve_a_gap_each_are_found_where_they_explain_nearly_a
     bare, single, both = (fit({name: {} for name in names}) for names in ("", "a", "ab"))
     monkeypatch.setattr(search, "excess", lambda item: excess[item.names])
     monkeypatch.setattr(worth, "is_worth", lambda *_: False)
+    monkeypatch.setattr(candidates, "extended", lambda *_: [both])
     monkeypatch.setattr(candidates, "best_laws", lambda *_: [both])
     first = [single]
     assert search.by_two(bare, first, None) == ([both, single] if found else first)  # type: ignore[arg-type]

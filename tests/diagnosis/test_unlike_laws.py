@@ -57,7 +57,7 @@ def test_such_laws_are_looked_at_beside_a_single_effect_that_leaves_something(
     effects: list[str], left: bool, looked: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def at(_: object, values: Values, z: Array, *_more: object) -> Fit:
-        return Fit(DATA, dict(values), z, NOISY)
+        return Fit(DATA, dict(values), z, NOISY if values else NOISY + 10.0)
 
     class Promised:
         effect, values, z = (
