@@ -13,7 +13,7 @@ from common.plan.kinds import TABLES_OF_KIND, check_kind, known_kind, planned
 from common.plan.laboratory_tables import RigTable, SlaveLaboratory
 from common.plan.plan import INTERFACE, TABLES, Plan
 from common.plan.plugins import checked
-from common.plan.schema import fill, nearest, plain
+from common.plan.schema import fill, nearest, plain, without_other_model
 from common.plan.tables import OF_CLIENT
 from common.plan.toml_file import tables_in, text_of
 from common.roles import MASTER, slave_role
@@ -22,7 +22,6 @@ from common.roles import MASTER, slave_role
 # sixth of it, and more have not been measured.
 MOST_SLAVES = 16
 SLAVE_NAME = re.compile(r"[a-z][a-z0-9_]*")
-MODELS = ("kind", "model")  # keys of a table that choose which further parameters it has
 NOMINAL = ("structure", "column", "actuator", "table", "damper", "sensors")
 CHOSEN = (
     "structure.rho_infinity",
@@ -159,20 +158,11 @@ def slave_laboratory(plan: Plan, name: str, given: dict[str, Any]) -> SlaveLabor
     parts: dict[str, Any] = {}
     for part in INTERFACE:
         own, common = given.get(part, {}), getattr(plan, part)
-        merged = inherited(common, own) | own if isinstance(own, dict) else own
+        entries = plain(common)
+        merged = without_other_model(common, entries, own) | own if isinstance(own, dict) else own
         parts[part] = fill(type(common), merged, f"{where}.{part}")
     rig = checked(fill(RigTable, given.get("rig", {}), f"{where}.rig"), f"{where}.rig")
     return SlaveLaboratory(rig=rig, kind=kind, **parts)
-
-
-def inherited(common: Any, own: dict[str, Any]) -> dict[str, Any]:
-    """The entries of the plan's own table that a named slave's table `own` is laid over.
-
-    Parameters of a model belong to it: one of another kind has its own.
-    """
-    entries = plain(common)
-    others = [key for key in MODELS if key in own and key in entries and own[key] != entries[key]]
-    return {key: value for key, value in entries.items() if hasattr(common, key)} if others else entries
 
 
 def check_tolerances(plan: Plan) -> None:

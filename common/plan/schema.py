@@ -18,6 +18,7 @@ Storeys = tuple[float, ...]
 StoreysOrMatrix = tuple[Any, ...]  # one number per storey, or one row of a matrix
 
 
+MODELS = ("kind", "model")  # keys of a table that choose which further parameters it has
 NAME = "[a-z0-9_-]+"
 PATTERNS = {NAME: "lower-case letters, digits, - and _"}  # the patterns in words for the user
 
@@ -196,6 +197,17 @@ def in_range(value: Any, rule: Rule, name: str) -> Any:
         end = f"; {hint}" if hint.endswith("?") else f"{'; ' * bool(hint)}{hint}."
         raise PlanError(f"{name} is {value!r}, but must be {rule.allowed()}{end}")
     return value
+
+
+def without_other_model(cls: object, entries: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries of a table, of class `cls`, over which those that are given may be laid.
+
+    Further parameters belong to the model of the entries: they go where another one is given.
+    """
+    if all(key not in given or given[key] == entries.get(key) for key in MODELS):
+        return dict(entries)
+    own = {field.name for field in table_fields(cls)}
+    return {key: value for key, value in entries.items() if key in own}
 
 
 def plain(table: Any) -> dict[str, Any]:

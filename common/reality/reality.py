@@ -13,11 +13,11 @@ from typing import Any
 from common.errors import PlanError
 from common.plan.building import OF_FOPDT
 from common.plan.kinds import TABLES_OF_KIND, known_kind
-from common.plan.laboratory_tables import RigTable
+from common.plan.laboratory_tables import Column, RigTable
 from common.plan.plan import Plan
 from common.plan.plugins import checked
 from common.plan.read import from_tables
-from common.plan.schema import fill, nearest
+from common.plan.schema import fill, nearest, without_other_model
 from common.plan.toml_file import load_tables
 from common.reality.found import LearnedEntry, check_found, learned
 from common.roles import MASTER, SLAVE, slave_role
@@ -260,9 +260,11 @@ def check_device(tables: Mapping[str, Any], where: str) -> None:
 def replaced(name: str, planned: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """The keys of a planned table that stay beside the values that a reality gives.
 
-    Where the reality has another actuator model, the parameters of the planned model go. Dashpots replace a damping
-    ratio, and a damping ratio replaces dashpots.
+    Where the reality has another model of actuator or specimen, the parameters of the planned model go. Dashpots
+    replace a damping ratio, and a damping ratio replaces dashpots.
     """
+    if name == "column":
+        return without_other_model(Column, planned, given)
     gone: tuple[str, ...] = ()
     if name == "actuator" and given.get("model", planned.get("model")) != planned.get("model"):
         gone = (*OF_FOPDT, "servo")

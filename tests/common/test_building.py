@@ -207,6 +207,15 @@ def test_a_reality_with_another_actuator_model_drops_the_planned_models_paramete
         truth(planned, "[actuator]\nmodel = 'servo_hydraulic'\ngain = 1.1\n[column]\nmass = 9.0\n")
 
 
+def test_a_reality_with_another_specimen_model_drops_the_planned_models_parameters() -> None:
+    plan = parse("[column]\nmodel = 'bilinear'\nyield_displacement = 0.003\nhardening = 0.1\n", Path())
+    linear = truth(plan, "[column]\nmodel = 'linear'\n").column
+    assert (linear.model, linear.parameters) == ("linear", {})
+    assert linear.stiffness == plan.column.stiffness
+    softer = truth(plan, "[column]\nhardening = 0.05\n").column
+    assert softer.parameters == {"yield_displacement": 0.003, "hardening": 0.05}
+
+
 def test_a_realitys_dashpots_replace_a_damping_ratio_and_the_reverse(plan: Plan, default_plan: Plan) -> None:
     def damping(planned: Plan, text: str) -> tuple[float, tuple[float, ...]]:
         found = truth(planned, f"[structure]\n{text}\n").structure
