@@ -14,8 +14,9 @@ from diagnosis.findings.certainty.trust import trusted
 from diagnosis.findings.verdict import judge
 from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.search import at_any_size, search
+from diagnosis.fits.search import Search, at_any_size, search
 from diagnosis.fits.unexplained import foresees, leaves, model_error
+from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.parts import FINE_ERROR, MODEL_ERROR, LaboratoryPart
 from diagnosis.recorded.record import Delay, Late, Record
 from tests.diagnosis.cases import Cases, imported, lab_a, lab_b
@@ -117,3 +118,17 @@ def test_the_name_of_so_small_a_gap_is_half_as_probable(cases: Cases) -> None:
     assert probability == pytest.approx(EITHER * otherwise)
     assert probability < 0.5
     assert "two good solutions" in next(other_causes(faint))
+
+
+@pytest.mark.parametrize(("share", "unknown"), [(0.0, False), (0.25, True)])
+def test_a_small_gap_that_the_inputs_foresee_is_an_unknown_effect(
+    share: float, unknown: bool, cases: Cases
+) -> None:
+    whole = cases.record({}, duration=8.0)
+    part = lab_b(whole)
+    measured, stroke = part.measured.copy(), part.measured[:, 2]
+    measured[:, 1] += share * residuals.prepare(part, whole).white[1] * stroke / stroke.std()
+    bare = settling.settled(fitting.fit(residuals.prepare(part.replaced(measured=measured), whole), {}))
+    found = Search(bare.data, bare, bare, ())
+    assert found.left < SEEN
+    assert (judge(found).outcome == "unknown") == unknown

@@ -23,7 +23,6 @@ from diagnosis.fits.fitting import Fit, at_end, without_rest
 from diagnosis.fits.hypothesis import TOLERANCES, Values
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
-from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import PartOfGap
 from diagnosis.signals.noise_model import Source
@@ -387,17 +386,3 @@ def test_friction_that_turns_round_over_all_speeds_is_a_drag_of_another_law() ->
 
     assert at_end(rubbing(1e-3)) == without_rest(rubbing(1e-3)) == ()
     assert at_end(rubbing(0.9 * most)) == without_rest(rubbing(0.9 * most)) == ("column.friction",)
-
-
-@pytest.mark.parametrize(("share", "unknown"), [(0.0, False), (0.25, True)])
-def test_a_small_gap_that_the_inputs_foresee_is_an_unknown_effect(
-    share: float, unknown: bool, cases: Cases
-) -> None:
-    whole = cases.record({}, duration=8.0)
-    part = lab_b(whole)
-    measured, stroke = part.measured.copy(), part.measured[:, 2]
-    measured[:, 1] += share * residuals.prepare(part, whole).white[1] * stroke / stroke.std()
-    bare = settling.settled(fitting.fit(residuals.prepare(part.replaced(measured=measured), whole), {}))
-    found = Search(bare.data, bare, bare, ())
-    assert found.left < SEEN
-    assert (judge(found).outcome == "unknown") == unknown
