@@ -158,7 +158,7 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
     The last are fits with one effect more, none of them worth it, where they were tried. `first` are the fits with one
     effect, best first. As the noise follows from what is left, it may change with every effect.
     """
-    chosen, better = bare, by_two(bare, first, scales)
+    chosen, better = bare, first
     while better and worth.is_worth(bare, chosen, best := trade.foremost(better)):
         if len(best.names) > 1 and not of_one_loop(best):
             best = candidates.in_other_laws(candidates.exchanged(best, scales))
@@ -176,25 +176,6 @@ def selected(bare: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, Fit, lis
         further = candidates.extended if of_one_loop(chosen) else candidates.best_laws
         better = further(chosen, scales)
     return bare, chosen, first, better
-
-
-def by_two(bare: Fit, first: list[Fit], scales: Scales) -> list[Fit]:
-    """Fits with one effect, best first, behind one with two where one alone explains too little and two nearly all.
-
-    Two faults of one machine may halve what is left each, so that neither is worth it by itself. `first` are the fits
-    with one effect, best first. Further laws are fitted only where first laws come near.
-    """
-    if not first or bare.data.part.exact or worth.is_worth(bare, bare, first[0]):
-        return first
-    if excess(first[0]) > (1.0 - STEP_OF_LEFT) * excess(bare):
-        return first
-    near = candidates.extended(first[0], scales)
-    if not near or excess(near[0]) > worth.HALF * excess(bare):
-        return first
-    both = candidates.best_laws(first[0], scales)
-    if not both or excess(both[0]) > (1.0 - worth.NEARLY_ALL) * excess(bare):
-        return first
-    return [both[0], *first]
 
 
 def by_impacts(bare: Fit, fit: Fit) -> Fit:

@@ -7,17 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.fits import (
-    candidates,
-    contact,
-    fitting,
-    residuals,
-    search,
-    sensor_noise,
-    settling,
-    trade,
-    worth,
-)
+from diagnosis.fits import candidates, contact, fitting, residuals, sensor_noise, settling, trade, worth
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.search import fewest, pruned
@@ -206,22 +196,6 @@ def test_a_change_counts_as_far_as_nominal_parameters_do_not_make_it_as_well() -
     left = worth.beyond_nominal(fitted, 4.0 * along + beside)
     share = 1.0 / (1.0 + float(np.sum(along**2)))
     np.testing.assert_allclose(left, 4.0 * share * along + beside, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("one", "two", "found"), [(50.0, 10.0, True), (50.0, 20.0, False), (80.0, 10.0, False)]
-)
-def test_two_effects_that_halve_a_gap_each_are_found_where_they_explain_nearly_all_of_it(
-    monkeypatch: pytest.MonkeyPatch, one: float, two: float, found: bool
-) -> None:
-    excess = {(): 100.0, ("a",): one, ("a", "b"): two}
-    bare, single, both = (fit({name: {} for name in names}) for names in ("", "a", "ab"))
-    monkeypatch.setattr(search, "excess", lambda item: excess[item.names])
-    monkeypatch.setattr(worth, "is_worth", lambda *_: False)
-    monkeypatch.setattr(candidates, "extended", lambda *_: [both])
-    monkeypatch.setattr(candidates, "best_laws", lambda *_: [both])
-    first = [single]
-    assert search.by_two(bare, first, None) == ([both, single] if found else first)  # type: ignore[arg-type]
 
 
 def test_two_effects_in_two_laboratories_are_both_found(cases: Cases) -> None:
