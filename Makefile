@@ -35,7 +35,7 @@ test: setup
 	$(BIN)/python -m simulation.warm
 	$(BIN)/pytest -n 3 --dist worksteal -m "not long and not slow and not faults and not soak"
 
-# whole diagnoses and trials of several seconds each, which give the same on any machine
+# whole diagnoses and trials of more than a second each, which give the same on any machine
 long: setup
 	$(BIN)/python -m simulation.warm
 	$(BIN)/pytest -n 3 --dist worksteal -m long

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from diagnosis.diagnose import diagnose
 from diagnosis.fits.laws.loop import table_of
 from tests.diagnosis.cases import Cases, lab_b
 
 
+@pytest.mark.long
 def test_a_damper_of_which_its_force_alone_was_recorded_is_searched(cases: Cases) -> None:
     whole = cases.record({"damper.motor_lag": {"time_constant": 0.01}}, duration=4.0)
     names = ("table_command", "damper_command", "damper_force")

@@ -87,6 +87,7 @@ def test_steps_of_a_reading_stay_where_neighbours_are_equal() -> None:
     assert quantum_between(clock.put_right(read, FAST, stepped=True)) == pytest.approx(step, rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_fast_clock_is_said_and_is_no_effect(cases: Cases) -> None:
     found = examine(logger.clocked(imported(cases.record(), fast)))
     assert found.record.fast == pytest.approx(FAST, rel=0.2)
@@ -94,6 +95,7 @@ def test_a_fast_clock_is_said_and_is_no_effect(cases: Cases) -> None:
     assert [text for text in found.warnings if "The clock of the readings is fast" in text]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "effects",
     [{}, {"column.friction": {"force": 900.0}}, {"actuator.delay": {"delay": 6e-3}}],

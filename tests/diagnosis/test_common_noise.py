@@ -51,5 +51,6 @@ def test_noise_of_which_inputs_foresee_nothing_is_none_of_the_gap_of_another_rea
     assert likely_sites(fit)[0] == "sensor.damper_stroke"
 
 
+@pytest.mark.long
 def test_without_a_gap_that_inputs_foresee_no_reading_stands_apart(cases: Cases) -> None:
     assert not any(unforeseen(bare(cases.record(duration=8.0))))

@@ -86,6 +86,7 @@ class FluidDamper(FrictionDamper):
         self.measured = (force + NOISE * np.random.default_rng(4).standard_normal(TICKS))[:, None]
 
 
+@pytest.mark.long
 def test_a_fluid_damper_is_viscous_with_its_exponent_whatever_stiffness_is_planned() -> None:
     part = FluidDamper()
     data = data_of(part)
@@ -115,6 +116,7 @@ class Relaxing(FrictionDamper):
         self.candidates = tuple(CATALOGUE[name] for name in ("column.viscous", "sensor.column_force.lag"))
 
 
+@pytest.mark.long
 def test_a_relaxing_part_is_one_effect_also_where_two_are_found_that_do_the_same() -> None:
     part = Relaxing()
     data = data_of(part)
@@ -150,6 +152,7 @@ class SoftlyPlanned(Driven):
         self.candidates = (CATALOGUE["column.yielding"], CATALOGUE["column.stiffness"])
 
 
+@pytest.mark.long
 def test_a_column_that_yields_is_found_where_the_planned_stiffness_means_nothing() -> None:
     data = data_of(SoftlyPlanned(), System(Plan()).scaled("column", "stiffness", 0.25))
     bare = fitting.fit(data, {})

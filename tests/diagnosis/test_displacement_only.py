@@ -42,6 +42,7 @@ def test_central_differences_are_the_motion_of_the_explicit_newmark_method(cases
         assert np.max(np.abs(found - true)[1:-1, place]) < most
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stiffer", [1.0, 1.2])
 def test_a_building_is_judged_by_its_displacement_alone(cases: Cases, stiffer: float) -> None:
     effects = {"structure.stiffness": {"factor": stiffer}} if stiffer > 1.0 else {}
@@ -57,6 +58,7 @@ def test_a_building_is_judged_by_its_displacement_alone(cases: Cases, stiffer: f
         assert found.outcome in ("none", "tolerances")
 
 
+@pytest.mark.long
 def test_a_whole_test_without_velocity_and_acceleration_is_diagnosed(cases: Cases) -> None:
     record = displacement_only(cases.record(duration=4.0))
     assert diagnose({"slave": record}, {})["slave"].report.status in ("no_gap", "within_tolerances")

@@ -48,6 +48,7 @@ def test_ends_of_a_resampled_reading_are_left_out(cases: Cases) -> None:
     assert [text for text in found.warnings if "bend as at the ends of a filter" in text]
 
 
+@pytest.mark.long
 def test_readings_of_all_laboratories_before_their_time_are_put_right(cases: Cases) -> None:
     found = examine(put_right(imported(cases.record(), early)))
     assert found.record.early == pytest.approx(EARLY, rel=0.2)
@@ -55,6 +56,7 @@ def test_readings_of_all_laboratories_before_their_time_are_put_right(cases: Cas
     assert [text for text in found.warnings if "before their time" in text]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "effects",
     [{}, {"actuator.delay": {"delay": -4e-3}}, {"table.delay": {"delay": -2e-3}}],

@@ -63,6 +63,7 @@ def test_a_frequency_response_is_that_of_a_channel_on_ticks(channel: ImportedCha
     assert passed[1000:] == pytest.approx(wanted[1000:], abs=2e-5)
 
 
+@pytest.mark.long
 def test_a_filter_of_the_forces_alone_is_found_and_leaves_no_gap(cases: Cases) -> None:
     found = filters.filtered(imported(cases.record(), behind_bessel, "N"))
     assert set(found.passed) == FORCES
@@ -74,12 +75,14 @@ def test_a_filter_of_the_forces_alone_is_found_and_leaves_no_gap(cases: Cases) -
     assert said[0].startswith("column_force and damper_force passed a low-pass filter")
 
 
+@pytest.mark.long
 def test_a_filter_of_all_channels_is_one(cases: Cases) -> None:
     found = filters.filtered(imported(cases.record(), behind_digital))
     assert len(set(found.passed.values())) <= 1
     assert late(found) == pytest.approx([DIGITAL_LATE], abs=3e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", [4, 5])
 def test_a_filter_with_a_ripple_is_found_as_late_as_it_is(cases: Cases, order: int) -> None:
     rippling = LoggerFilter("chebyshev", order, 90.0, 0.3)
@@ -209,12 +212,14 @@ def test_rows_that_are_missing_make_no_filter(cases: Cases) -> None:
     assert (found.passed, found.late) == ({}, NOT_LATE)
 
 
+@pytest.mark.long
 def test_a_laboratory_with_an_effect_does_not_hide_a_filter(cases: Cases) -> None:
     rubbing = cases.record({"column.friction": {"force": 900.0}})
     found = late(filters.filtered(imported(rubbing, behind_bessel)))
     assert (min(found), max(found)) == pytest.approx((LATE, LATE), rel=0.05)
 
 
+@pytest.mark.long
 def test_readings_that_are_late_alike_have_no_filter(cases: Cases) -> None:
     found = filters.filtered(imported(cases.record(), lambda x: np.r_[x[:1], x[:1], x[:-2]]))
     assert found.passed == {}

@@ -49,6 +49,7 @@ def found_z(fit: Fit) -> dict[str, float]:
     return {item.name: float(z) for item, z in zip(fit.data.part.nuisances, fit.z, strict=True)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(
     ("kind", "sharp"),

@@ -37,6 +37,7 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
     return Cases(tmp_path_factory, STRONGEST)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", FOUND)
 def test_the_right_effect_closes_the_gap_down_to_the_noise(cases: Cases, kind: str) -> None:
     far = cases.report(FOUND[kind])["how_far"]
@@ -81,6 +82,7 @@ def test_the_waterfall_decreases_site_by_site(cases: Cases) -> None:
     assert {step["label"] for step in steps[2:-1]} == {"+ column.friction", "+ damper.friction"}
 
 
+@pytest.mark.long
 def test_tolerances_alone_are_not_a_gap_and_are_reported_separately(cases: Cases) -> None:
     report = cases.report(seed=3)
     far = report["how_far"]
@@ -102,6 +104,7 @@ def test_shares_of_two_sites_sum_to_one(cases: Cases) -> None:
     assert sum(row["shapley"] for row in rows) == pytest.approx(closed - report["how_far"]["after"], rel=0.35)
 
 
+@pytest.mark.long
 def test_another_recording_of_the_same_laboratories_is_used_to_judge_the_gap(cases: Cases) -> None:
     effects = FOUND["column"]
     other = cases.file(effects, scale=0.15, duration=8.0)
@@ -117,6 +120,7 @@ def test_another_recording_of_the_same_laboratories_is_used_to_judge_the_gap(cas
     assert far["nominal"] > 0.0
 
 
+@pytest.mark.long
 def test_the_gap_on_a_recording_of_other_laboratories_is_not_closed(cases: Cases) -> None:
     wrong = cases.file({"table.gain": {"factor": 0.93}}, scale=0.15, duration=8.0)
     far = diagnose_file(cases.file(FOUND["column"]), validate=[wrong]).how_far
@@ -200,6 +204,7 @@ def test_a_recording_of_other_parts_judges_nothing_and_says_so(cases: Cases, loo
     assert any("no part" in text for text in warned.warnings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "effects",
     [
@@ -289,6 +294,7 @@ def test_a_diverging_simulation_is_reported_as_a_gap(rubbing: Diagnosis) -> None
     assert set(quiet.gap(judge.signals(None))) == {"column_force"}
 
 
+@pytest.mark.long
 def test_effects_that_hardly_change_the_response_are_judged_by_readings(
     cases: Cases, loopless: Diagnosis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -301,6 +307,7 @@ def test_effects_that_hardly_change_the_response_are_judged_by_readings(
         assert response.how_far.closed == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.long
 def test_names_beside_which_the_response_stays_open_have_the_probability_of_a_partial_verdict(
     cases: Cases, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -95,6 +95,7 @@ def test_parameters_are_refined_on_the_rows_that_selection_did_not_see(cases: Ca
     assert better.values["damper.friction"]["force"] == pytest.approx(3.0, rel=0.03)
 
 
+@pytest.mark.long
 def test_an_interval_leaves_room_for_another_formula(cases: Cases) -> None:
     name = "damper.friction"
     whole = cases.record({name: {"force": 3.0}}, duration=4.0)

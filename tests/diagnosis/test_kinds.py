@@ -94,6 +94,7 @@ def test_a_hidden_effect_of_a_users_device_is_named(tmp_path: Path) -> None:
     assert boxes(report) == ["ground", "structure", "link", "device"]
 
 
+@pytest.mark.long
 def test_a_test_that_is_as_planned_has_no_gap(tmp_path: Path) -> None:
     assert diagnosed(TWO, tmp_path)["east"].status == "no_gap"
 

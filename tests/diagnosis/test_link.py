@@ -102,6 +102,7 @@ def test_the_parameters_of_an_impaired_link_are_found_over_a_grid() -> None:
     assert min(np.mean(hits) for hits in inside.values()) >= 0.85
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("burst", [1.0, 8.0])
 def test_rare_losses_are_found_with_intervals_that_cover_them(burst: float) -> None:
     hits = []

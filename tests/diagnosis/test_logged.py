@@ -60,6 +60,7 @@ def noisy(whole: Record, colour: float = 0.0) -> Record:
     return relogged(whole, "column_force", late + LEVEL * noise)
 
 
+@pytest.mark.long
 def test_forces_with_extra_noise_are_recognized_as_logged(cases: Cases) -> None:
     whole = cases.record()
     assert not own_noise(logged(whole))
@@ -67,6 +68,7 @@ def test_forces_with_extra_noise_are_recognized_as_logged(cases: Cases) -> None:
     assert own_noise(logged(noisy(whole)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_a_loggers_delay_is_found_and_its_noise_is_not_a_gap(cases: Cases, colour: float) -> None:
     found = search(logged(noisy(cases.record(), colour)), Scales(cases.record()))

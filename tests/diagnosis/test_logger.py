@@ -71,6 +71,7 @@ def test_readings_that_are_early_by_less_than_an_interval_are_those_of_a_logger(
     assert [one.early for one in parts_of(whole) if isinstance(one, LaboratoryPart)] == [0.0, 0.0]
 
 
+@pytest.mark.long
 def test_a_hum_far_above_the_noise_is_no_gap(cases: Cases) -> None:
     found = examine(imported(cases.record(), hum))
     assert set(outcomes(found).values()) <= {"none", "tolerances"}
@@ -104,6 +105,7 @@ def test_noise_beside_an_effect_is_no_louder_than_the_noise_accepted(cases: Case
     assert not settling.no_louder(data, None)
 
 
+@pytest.mark.long
 def test_a_reading_without_a_gap_may_be_as_loud_beside_an_effect_on_another_one(cases: Cases) -> None:
     whole = imported(cases.record({"sensor.column_displacement.gain": {"factor": 0.8}}), noisy)
     data = residuals.prepare(lab_a(whole), whole)

@@ -57,6 +57,7 @@ def test_an_inertia_that_a_restless_command_hides_in_noise_is_found(cases: Cases
     assert verdict.search.chosen.values["column.inertia"]["mass"] == pytest.approx(1000.0, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("times", "alone"), [((15.0, 1.2), True), ((15.0, 14.0), False), ((15.0,), True), ((5.0, 0.2), False)]
 )

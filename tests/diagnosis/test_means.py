@@ -52,6 +52,7 @@ def test_a_mean_of_a_wave_is_its_integral(length: float, frequency: float) -> No
     assert np.abs(channel.response(np.array([frequency]))) == pytest.approx(np.sinc(frequency * length))
 
 
+@pytest.mark.long
 def test_a_mean_of_which_nothing_is_stated_is_found_and_leaves_no_gap(cases: Cases) -> None:
     found = filters.filtered(imported(cases.record(), mean))
     assert found.passed == {}

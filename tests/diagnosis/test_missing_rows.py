@@ -22,6 +22,7 @@ def test_a_line_over_a_short_gap_misses_little_of_a_command(width: float, least:
     assert least <= missing_rows.missed(COMMAND, T, 3.0, 3.0 + width) <= most
 
 
+@pytest.mark.long
 def test_nothing_is_half_as_sure_where_readings_are_not_judged(
     cases: Cases, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,6 +10,7 @@ from diagnosis.fits.search import Search
 from tests.diagnosis.cases import Cases, lab_a
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("time_constant", "relaxes"), [(1.0, False), (6.0, True)])
 def test_a_load_cell_that_leaks_for_longer_than_the_test_may_be_a_specimen_that_relaxes(
     cases: Cases, time_constant: float, relaxes: bool

@@ -50,6 +50,7 @@ def test_a_few_samples_from_elsewhere_are_told_and_large_ones_are_an_effect(
         assert found.which[0].effects == ()
 
 
+@pytest.mark.long
 def test_samples_that_several_readings_show_are_no_error_of_one(cases: Cases) -> None:
     whole = disturbed(cases.record(duration=8.0), 700.0, "damper_stroke", "damper_force")
     data = residuals.prepare(lab_b(whole), whole)

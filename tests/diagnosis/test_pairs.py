@@ -95,6 +95,7 @@ def test_a_simpler_description_stands_unless_it_moves_a_nominal_parameter_too_fa
     assert len(others) == 1
 
 
+@pytest.mark.long
 def test_what_an_impact_makes_vague_counts_less_than_what_shows_before_it(cases: Cases) -> None:
     whole = cases.record(LOUDER, duration=4.0)
     data, nominal = residuals.prepare(lab_b(whole), whole), np.zeros(7)

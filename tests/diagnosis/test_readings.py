@@ -37,12 +37,14 @@ def test_a_rounded_reading_is_found_with_its_step(cases: Cases, signal: str, ste
     assert found.ratio > 1.0
 
 
+@pytest.mark.long
 def test_rounding_far_below_the_noise_gives_no_finding(cases: Cases) -> None:
     whole = cases.record({"sensor.column_force.quantization": {"step": 1.0}}, duration=8.0)
     assert readings.steps(whole) == {"column_force": pytest.approx(1.0)}
     assert found_in(whole) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("signal", "rms"), [("column_force", 500.0), ("damper_stroke", 2e-5), ("table_acceleration", 0.05)]
 )
@@ -69,6 +71,7 @@ def test_sensors_that_are_all_equally_noisier_than_planned_give_no_finding(cases
     assert readings.findings(whole, loud, {}, {}) == []
 
 
+@pytest.mark.long
 def test_rounding_shared_by_all_readings_of_a_unit_is_attributed_to_the_logger(cases: Cases) -> None:
     effects = {f"sensor.{name}.quantization": {"step": 1.0} for name in ("column_force", "damper_force")}
     more = {

@@ -172,6 +172,7 @@ def test_a_recording_longer_than_its_ground_motion_holds_the_last_value(cases: C
     assert set(found[0, 3000:]) == {found[0, 2999]}
 
 
+@pytest.mark.long
 def test_in_the_ideal_test_the_transfer_systems_are_commanded_with_their_targets(cases: Cases) -> None:
     plain, held = record.build(run_of(cases)), record.build(run_of(cases), against_ideal=True)
     target = plain.signals["column_target"]

@@ -56,6 +56,7 @@ def numbers(value: Any) -> Iterator[float]:
         assert value is None or type(value) in (int, str, bool), type(value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "kind", [pytest.param(kind, marks=pytest.mark.slow) if kind == "two" else kind for kind in KINDS]
 )

@@ -72,6 +72,7 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> Cases:
     return Cases(tmp_path_factory, STRONGEST)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("effect", "values", "near"),
     [pytest.param(*row, id=row[0], marks=pytest.mark.slow if row[0] in RARE else ()) for row in ALONE],
@@ -150,6 +151,7 @@ def test_an_end_stop_is_found_with_its_stroke(cases: Cases) -> None:
     assert estimate(report, "damper.stroke_stop", "stroke") == pytest.approx(0.04, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
 def test_a_clean_laboratory_gives_no_effect(cases: Cases, seed: int) -> None:
     report = cases.report(seed=seed)

@@ -137,6 +137,7 @@ def test_hypotheses_that_err_in_withheld_seconds_only_are_told_apart_by_fits_to_
     assert trade.on_all(chosen, [rival, other]) == (chosen, [rival, other])
 
 
+@pytest.mark.long
 def test_an_effect_without_which_nothing_is_left_either_is_not_needed(cases: Cases) -> None:
     late: Values = {"actuator.delay": {"delay": 0.004}}
     data = residuals.prepare(lab_a(whole := cases.record(late, duration=8.0)), whole)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from common.plan.plan import Plan
 from diagnosis.fits import fitting, residuals
@@ -114,6 +115,7 @@ class LooseTable(Measured):
         raise NotImplementedError
 
 
+@pytest.mark.long
 def test_play_behind_the_tables_loop_is_told_from_play_before_it() -> None:
     part = LooseTable()
     group, train = residuals.withheld(part.TICKS, INTERVAL)

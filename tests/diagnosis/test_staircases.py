@@ -21,6 +21,7 @@ def motion(amplitude: float) -> Array:
     return amplitude * (np.sin(2.0 * np.pi * 0.9 * t) + 0.5 * np.sin(2.0 * np.pi * 2.3 * t + 1.0))
 
 
+@pytest.mark.long
 @given(
     step=st.floats(1e-7, 1e2),
     levels=st.floats(3.0, 60.0),

@@ -242,6 +242,7 @@ def behind_logger(whole: Record) -> Record:
     return replace(whole, signals=whole.signals | coloured)
 
 
+@pytest.mark.long
 def test_slow_noise_far_louder_than_that_of_all_other_readings_may_be_an_unknown_effect(
     cases: Cases,
 ) -> None:
@@ -349,6 +350,7 @@ def test_an_effect_that_is_hardly_the_cause_stands_in_for_it() -> None:
     assert wording.of_part(learned, likely=True) == wording.of_part(entry, likely=True)
 
 
+@pytest.mark.long
 def test_an_unknown_effect_in_one_part_does_not_hide_the_name_of_another(
     cases: Cases, monkeypatch: pytest.MonkeyPatch
 ) -> None:

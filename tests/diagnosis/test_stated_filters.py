@@ -103,6 +103,7 @@ def test_noise_is_measured_by_the_frequencies_that_passed(cases: Cases) -> None:
     assert data.white[place] > 0.3 * 4.0 * level > 10.0 * by_ticks
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rate", "names"), [(300.0, {"damper_stroke"}), (4000.0, set())])
 def test_what_straight_lines_between_rows_may_miss_is_no_noise_that_follows_the_motion(
     rate: float, names: set[str], cases: Cases

@@ -58,6 +58,7 @@ def test_a_gain_that_sways_is_an_effect_of_its_reading(cases: Cases) -> None:
     assert f"at {SWAY:.2g} Hz" in said[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("moved", [False, True])
 def test_a_small_sway_does_not_count_where_readings_were_moved_in_time(cases: Cases, moved: bool) -> None:
     whole = cases.record(duration=8.0)

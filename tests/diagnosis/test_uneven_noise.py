@@ -40,6 +40,7 @@ def erring(whole: Record, name: str) -> Record:
     return replace(whole, signals=whole.signals | {name: read + made})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["damper_stroke", "column_displacement", "damper_force"])
 def test_noise_that_follows_the_motion_is_an_effect_of_its_reading(name: str, cases: Cases) -> None:
     whole = erring(cases.record(duration=8.0), name)
@@ -109,6 +110,7 @@ def test_an_error_of_one_reading_is_told_in_place_of_a_smaller_gap_of_the_smalle
     assert with_own_error(verdict, ()).own == (own if told else None)
 
 
+@pytest.mark.long
 def test_readings_of_which_something_is_known_are_left_aside(cases: Cases) -> None:
     whole = erring(cases.record(duration=8.0), "damper_stroke")
     part = lab_b(whole)

@@ -112,6 +112,7 @@ def spoilt(cases: Cases, kind: str, effects: hypothesis.Values) -> Data:
     return data
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("site", SITES)
 def test_an_unexplained_residual_is_attributed_to_the_site_of_the_signals_that_show_it(
     cases: Cases, site: str

@@ -57,6 +57,7 @@ def test_effects_are_hidden_in_every_laboratory_and_every_case_can_be_built(name
         assert truth.plan.sensors != plan.sensors
 
 
+@pytest.mark.long
 def test_laboratories_of_one_kind_share_its_effects_by_name() -> None:
     columns, storeys = trial_of("two_columns"), trial_of("two_storeys")
     for index in range(40):
@@ -82,6 +83,7 @@ def test_the_oracle_varies_the_parameters_of_the_laboratory_that_it_judges(name:
         assert len(tolerated(case, role)) == {"column": 4, "table": 7}[kind]
 
 
+@pytest.mark.long
 def test_cases_of_a_users_kind_are_drawn_from_its_own_effects_and_tolerances() -> None:
     trial = trial_of(DAMPER)
     assert {"device.leak", "device.air"} < set(trial.library.catalogue)
@@ -94,6 +96,7 @@ def test_cases_of_a_users_kind_are_drawn_from_its_own_effects_and_tolerances() -
         assert 0.5 * 300.0 <= noise <= 3.0 * 300.0
 
 
+@pytest.mark.long
 def test_a_case_of_a_users_kind_is_recorded_with_the_size_of_its_effect(tmp_path: Path) -> None:
     (leak,) = draw(1, 1, "judge", trial=trial_of(DAMPER), only=["formula"], effects=["device.leak"])
     found = record(leak, tmp_path)

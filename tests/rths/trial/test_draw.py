@@ -75,6 +75,7 @@ def test_a_case_does_not_depend_on_the_number_of_cases() -> None:
     assert draw(1, 6, "judge") != few[:1]
 
 
+@pytest.mark.long
 def test_cases_with_given_numbers_are_those_of_the_set() -> None:
     every = {case.index: case for case in draw(12, 5, "judge")}
     assert [case.index for case in every.values()] == list(range(12))

@@ -74,6 +74,7 @@ def test_a_filter_passes_waves_as_its_analogue_prototype_does() -> None:
             assert np.max(np.abs(passed - wanted)[10_000:]) < 2e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("logger", ["600_hz", "lost_rows", "bessel"])
 def test_a_recording_is_an_import_whose_readings_are_those_of_the_laboratory(
     tmp_path: Path, logger: str

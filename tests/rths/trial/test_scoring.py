@@ -306,6 +306,7 @@ def test_calibration_bins_contain_every_value_once() -> None:
     assert sum(item.count for item in reliability(some())) == 20
 
 
+@pytest.mark.long
 def test_results_are_json_and_their_page_loads_nothing_from_elsewhere() -> None:
     text = json.dumps(results(some()), allow_nan=False)
     assert len(json.loads(text)["cases"]) == 24

@@ -47,6 +47,7 @@ def moves(item: Case, *names: str) -> list[float]:
     return [item.truths[table][key] / item.plan[table][key] - 1.0 for table, key in tables]
 
 
+@pytest.mark.long
 def test_normal_tolerances_are_standard_deviations() -> None:
     names = ("actuator.gain", "actuator.delay", "actuator.time_constant", "table.frequency", "damper.mass")
     found = np.array([moves(item, *names) for item in drawn("normal", 40)]).ravel() / 0.02
