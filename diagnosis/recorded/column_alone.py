@@ -6,6 +6,7 @@ from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import nuisances
 from diagnosis.recorded.parts import Measured, cut, of_sites, outputs
 from diagnosis.recorded.record import Record
+from diagnosis.recorded.smoothed import smoothed
 from loop import replay
 from models.registry import Array
 from models.system import System
@@ -21,7 +22,8 @@ class ColumnAlone(Measured):
         self.lab, self.role = lab, lab.role
         displacement, force = lab.kind.channels.position, lab.kind.channels.force
         self.signals: tuple[str, ...] = (lab.signal(force),)
-        self.inputs = record.signals[lab.signal(displacement)]
+        reading = record.signals[lab.signal(displacement)]
+        self.inputs = reading if record.static else smoothed(reading)  # rows have no frequencies
         self.measured, self.present = outputs(record, self.signals)
         machine = next(item for item in lab.kind.machines(lab.plan) if item.site == "column")
         self.nuisances = nuisances(lab, machine.parameters)

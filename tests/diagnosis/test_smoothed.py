@@ -1,0 +1,36 @@
+"""Motions that drive a specimen without the white noise of their sensor."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.recorded.smoothed import smoothed
+
+STEP, ROWS = 1.0 / 1024.0, 12 * 1024
+NOISE = 3e-6  # m
+
+
+def motion(highest: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Sines up to a frequency (Hz) that begin and end at rest, m."""
+    t = STEP * np.arange(ROWS)
+    waves = sum(0.01 / f * np.sin(2.0 * np.pi * f * t + f) for f in (0.5, 1.3, 4.1, highest))
+    return np.asarray(waves * np.sin(np.pi * t / t[-1]) ** 2)
+
+
+@pytest.mark.parametrize("highest", [9.0, 60.0])
+def test_noise_above_the_motion_is_left_out_and_the_motion_is_not(highest: float) -> None:
+    true = motion(highest)
+    found = smoothed(true + NOISE * np.random.default_rng(1).standard_normal(ROWS))
+    assert np.std(found - true) < 0.6 * NOISE
+    # a dashpot multiplies noise by frequency: that of a reading is σ/(Δ√2) of its rate
+    missed = np.gradient(found - true, STEP)
+    assert np.std(missed) < 0.25 * NOISE / (np.sqrt(2.0) * STEP)
+
+
+def test_a_reading_that_moves_at_all_frequencies_or_has_no_noise_stays_as_it_is() -> None:
+    rough = np.cumsum(np.random.default_rng(2).standard_normal(ROWS))
+    for reading in (rough, motion(400.0) + 1e-12 * rough, np.zeros(ROWS)):
+        assert np.array_equal(smoothed(reading), reading)
