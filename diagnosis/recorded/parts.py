@@ -271,10 +271,11 @@ class LaboratoryPart:
         """What a command that bends within a step adds to straight lines, (ticks, channels), by the plan's laboratory.
 
         Straight lines over a step h take (ω·h)²/12 of what a servo of frequency ω is commanded. That depends on what a
-        fit moves in the second order only.
+        fit moves in the second order only. A motor's command is held where an interval is one step, and does not bend.
         """
         if self.curved is None:
             plan = System(self.lab.plan).unread
+            drive = [drive[0], np.zeros_like(drive[1])] if self.steps == 1 else drive
             few, many = (self.stepped(plan, drive, steps) for steps in (self.steps, BENT * self.steps))
             self.curved = many - few
         return self.curved

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from common.recording.imported import imported
 from common.recording.reader import read
@@ -118,3 +119,31 @@ def test_a_drive_that_holds_its_command_by_its_plan_is_replayed_so(
     place = part.signals.index("column_displacement")
     missed = part.measured[:, place] - part.predict(whole.systems["master"])[:, place]
     assert bool(np.std(missed) < 1.05 * 5e-6) is (command == "held")
+
+
+def test_a_motors_command_is_held_from_its_row_on_where_an_interval_is_one_step(
+    call: Any, tmp_path: Path
+) -> None:
+    mass, spring, dashpot, step = 95.0, 5e3, 200.0, 1e-3
+    t = step * np.arange(4000)
+    force = np.where(np.sin(2.0 * np.pi * 0.9 * t) > 0.3, 40.0, 0.0) + 20.0 * np.sin(2.0 * np.pi * 3.0 * t)
+    moves = expm(step * np.array([[0.0, 1.0, 0.0], [-spring / mass, -dashpot / mass, 1.0 / mass], [0.0] * 3]))
+    state, stroke = np.zeros(2), np.empty(t.size)
+    for k, push in enumerate(force):
+        stroke[k] = state[0]
+        state = moves[:2] @ [*state, push]
+    np.savetxt(tmp_path / "a.csv", np.column_stack([force, stroke]), "%.12g", ",", header="F,q", comments="")
+    (tmp_path / "motor.toml").write_text(
+        f"[test]\ninterval = {step}\n[damper]\nmass = {mass}\nstiffness = {spring}\ndamping = {dashpot}\n"
+        "motor_time_constant = 0.0\n"
+    )
+    (tmp_path / "map.toml").write_text(
+        f'plan = "motor.toml"\nrate = {1.0 / step}\n[signals]\ndamper_command = {{ column = "F" }}\n'
+        'damper_stroke = { column = "q" }\ntable_acceleration = { value = 0.0 }\n'
+    )
+    path = tmp_path / "a.mcap"
+    assert call("import", tmp_path / "a.csv", "--map", tmp_path / "map.toml", "-o", path) == 0
+    built = record.build(read(path), role="slave")
+    (part,) = (one for one in parts_of(built) if isinstance(one, LaboratoryPart))
+    said = part.predict(built.systems["slave"])[:, part.signals.index("damper_stroke")]
+    assert np.max(np.abs(said - stroke)) < 1e-9 * np.max(np.abs(stroke))
