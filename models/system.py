@@ -111,13 +111,14 @@ class TableEffects:
     oil_frequency: float = math.inf  # Hz
     oil_damping: float = 0.1
     oil_share: float = 1.0  # of the motion that passes through that resonance
+    oil_law: float = 0.0  # 2 the dashpot lies between loop and platform
     feed_velocity: float = 0.0  # fed forward: share of what makes up for the loop's damping
     feed_acceleration: float = 0.0  # and for its inertia
     feed_lag: float = 0.001  # s, of the filter behind which both are computed
     second_frequency: float = math.inf  # Hz, of a mass that swings on the platform
     second_share: float = 0.1  # of the mass that the loop moves
     second_damping: float = 0.03  # ratio at that frequency
-    second_law: float = 0.0  # 0 the loop opposes its stiffness, 1 its flow
+    second_law: float = 0.0  # 0 the loop opposes its stiffness, 1 its flow, 2 that of a platform without the mass
     velocity_limit: float = math.inf  # m/s, at which the loop's valve is open
     velocity_limit_sharpness: float = math.inf  # with which the speed bends there
     compliance: float = 0.0  # m/N

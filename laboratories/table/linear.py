@@ -16,6 +16,8 @@ BASE, BASE_RATE = 6, 7  # the table below an oil column's resonance, where there
 SWING, SWING_RATE = 8, 9  # how far a mass that swings on the platform is ahead of it, where there is one
 RAMP, PUSH, RAIL, DRAG = range(4)  # inputs: table command, motor force N, force g N, table friction m/s²
 FLOW = 1.0  # the law of `table.second_mass` of a loop that gives way at a speed
+ADDED = 2.0  # that of a mass without which the loop was tuned
+BETWEEN = 2.0  # the law of `table.oil_column` whose dashpot lies between loop and platform
 BEHIND_LOOP = 1.0  # the law of `table.backlash` with the play between loop and platform
 INPUTS = 5  # columns behind the states: command before and after, motor command, g, table friction
 
@@ -85,6 +87,10 @@ def swinging(a: Array, b: Array, rate: int, omega: float, effects: TableEffects)
     if effects.second_law == FLOW:
         a[rate, SWING_RATE] += share / (1.0 - share) * second**2 / omega
         return
+    if effects.second_law == ADDED:
+        a[rate, SWING] += share / (1.0 - share) * second**2
+        a[rate, SWING_RATE] += share / (1.0 - share) * damped
+        return
     a[rate, SWING] += share * second**2
     a[rate, SWING_RATE] += share * damped
     a[rate] /= 1.0 - share
@@ -98,7 +104,8 @@ def lagging_matrix(
 
     Under the damper's force F the table gives way as if its command were changed by compliance·F.
     With an oil column the platform follows the table below it as a second oscillator, or by a share σ of its motion:
-    ÿ = (1 − σ)·ẍ + ω_o²·(x − y) + 2ζ_o·ω_o·((1 − σ)·ẋ − ẏ), with x the motion of the table below it.
+    ÿ = (1 − σ)·ẍ + ω_o²·(x − y) + 2ζ_o·ω_o·((1 − σ)·ẋ − ẏ), with x the motion of the table below it; where the dashpot
+    lies between the two, ÿ = ω_o²·(x − y) + 2ζ_o·ω_o·(ẋ − ẏ).
     A mass that swings on the platform pulls at the loop, as the damper does.
     """
     size = states(damper, effects, motor_damping)
@@ -129,7 +136,7 @@ def lagging_matrix(
             a[TABLE_RATE] += straight * a[rate]
             a[TABLE_RATE, BASE_RATE] += straight * 2.0 * effects.oil_damping * oil
             b[TABLE_RATE] += straight * b[rate]
-        if effects.backlash_law == BEHIND_LOOP:  # dashpots of flanks are between the two
+        if effects.oil_law == BETWEEN or effects.backlash_law == BEHIND_LOOP:  # dashpots, as those of flanks
             a[TABLE_RATE, BASE_RATE] = 2.0 * effects.oil_damping * oil
     if size > SWING_RATE:
         a[SWING_RATE] -= a[TABLE_RATE]

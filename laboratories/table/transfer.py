@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from common.plan.laboratory_tables import ShakingTable
-from laboratories.table.linear import FLOW
+from laboratories.table.linear import ADDED, BETWEEN, FLOW
 from models.system import TableEffects
 
 Spectrum = npt.NDArray[np.complex128]
@@ -26,7 +26,7 @@ def displacement(s: Spectrum, interval: float, table: ShakingTable, effects: Tab
     loop = s**2 + 2.0 * table.damping_ratio * omega * s + omega**2
     behind = behind_loop(s, effects)
     if not math.isinf(effects.second_frequency):
-        loop = loop - pulled(s, omega, effects) * behind
+        loop = loop - pulled(s, omega, effects) * behind - lacking(effects) * s**2
     ramps = np.sinc(s.imag * interval / (2.0 * math.pi)) ** 2
     late = np.exp(-table.delay * s)
     return np.asarray(
@@ -45,8 +45,9 @@ def behind_loop(s: Spectrum, effects: TableEffects) -> Spectrum:
     if math.isinf(effects.oil_frequency):
         return np.ones_like(s)
     oil = 2.0 * math.pi * effects.oil_frequency
-    share = effects.oil_share
-    return np.asarray(1.0 - share + share * oil**2 / (s**2 + 2.0 * effects.oil_damping * oil * s + oil**2))
+    damped, share = 2.0 * effects.oil_damping * oil * s, effects.oil_share
+    moved = oil**2 + damped if effects.oil_law == BETWEEN else oil**2
+    return np.asarray(1.0 - share + share * moved / (s**2 + damped + oil**2))
 
 
 def pulled(s: Spectrum, omega: float, effects: TableEffects) -> Spectrum:
@@ -56,7 +57,13 @@ def pulled(s: Spectrum, omega: float, effects: TableEffects) -> Spectrum:
     ahead = -(s**2) / (s**2 + damped * s + second**2)
     if effects.second_law == FLOW:
         return np.asarray(share / (1.0 - share) * second**2 / omega * s * ahead)
-    return np.asarray(share * ((damped * s + second**2) * ahead + s**2))
+    ratio = share / (1.0 - share) if effects.second_law == ADDED else share
+    return np.asarray(ratio * (damped * s + second**2) * ahead)
+
+
+def lacking(effects: TableEffects) -> float:
+    """The share of the mass that its loop was tuned to move, and does not move as it swings by itself."""
+    return 0.0 if effects.second_law in (FLOW, ADDED) else effects.second_share
 
 
 def fed_forward(

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from common.errors import InputError
 from common.plan.laboratory_tables import Damper, ShakingTable
-from laboratories.table import linear
+from laboratories.table import linear, transfer
 from laboratories.table import model as table_lab
 from models import preisach
 from models.system import DamperEffects, TableEffects
@@ -79,6 +79,27 @@ def test_a_share_of_the_motion_passes_through_the_oil_column(frequency: float, s
 
 
 @pytest.mark.parametrize("frequency", [2.0, 9.0, 14.0])
+@pytest.mark.parametrize("damping", [0.05, 0.3])
+def test_a_dashpot_that_moves_with_the_loop_delays_the_platform_by_less(
+    frequency: float, damping: float
+) -> None:
+    t = np.arange(1, 4001) * DT
+    command = 5e-3 * np.cos(2.0 * np.pi * frequency * t) * np.minimum(t, 1.0)
+    effects = TableEffects(oil_frequency=17.0, oil_damping=damping, oil_law=2.0)
+    got = run_b(command, damper=STILL, table_effects=effects)
+    s, ramps = 2j * math.pi * frequency, np.sinc(frequency * DT) ** 2
+    oil = 2.0 * math.pi * 17.0
+    moved = (2.0 * damping * oil * s + oil**2) / (s**2 + 2.0 * damping * oil * s + oil**2)
+    expected = np.exp(-0.004 * s) * second_order(s, 15.0, 0.7) * moved * 5e-3 * ramps
+    found = phasor(got[:, Y], t, frequency, 4.0)
+    assert abs(found - expected) < 2e-3 * abs(expected)
+    assert phasor(got[:, ACCELERATION], t, frequency, 4.0) == pytest.approx(s**2 * found, rel=2e-2)
+    table = ShakingTable(frequency=15.0, damping_ratio=0.7, delay=0.004)
+    said = transfer.displacement(np.array([s]), DT, table, effects)[0]
+    assert said == pytest.approx(expected / 5e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize("frequency", [2.0, 9.0, 14.0])
 @pytest.mark.parametrize(("velocity", "acceleration", "lag"), [(0.9, 0.8, 2e-3), (-0.5, 0.0, 6e-3)])
 @pytest.mark.parametrize("oil", [math.inf, 20.0])
 def test_velocity_and_acceleration_fed_forward_have_their_transfer_function(
@@ -105,7 +126,7 @@ def test_velocity_and_acceleration_fed_forward_have_their_transfer_function(
 
 
 @pytest.mark.parametrize("frequency", [2.0, 4.0, 9.0])
-@pytest.mark.parametrize("law", [0.0, 1.0])
+@pytest.mark.parametrize("law", [0.0, 1.0, 2.0])
 @pytest.mark.parametrize(("oil", "share"), [(math.inf, 1.0), (17.0, 1.0), (17.0, 0.2)])
 def test_a_mass_that_swings_on_the_platform_pulls_at_its_loop(
     frequency: float, law: float, oil: float, share: float
@@ -123,7 +144,8 @@ def test_a_mass_that_swings_on_the_platform_pulls_at_its_loop(
     got = run_b(command, damper=STILL, table_effects=more)
     s, omega, second = 2j * math.pi * frequency, 2.0 * math.pi * 15.0, 2.0 * math.pi * 4.2
     ahead = -(s**2) / (s**2 + 0.1 * second * s + second**2)  # of the mass, over the platform's motion
-    pull = 0.3 * (second**2 + 0.1 * second * s if law == 0.0 else second**2 * s / omega / 0.7) * ahead
+    spring = second**2 + 0.1 * second * s
+    pull = {0.0: 0.3 * spring, 1.0: 0.3 / 0.7 * second**2 * s / omega, 2.0: 0.3 / 0.7 * spring}[law] * ahead
     platform = 1.0 - share + share * second_order(s, oil, 0.1) if math.isfinite(oil) else 1.0
     loop = (0.7 if law == 0.0 else 1.0) * s**2 + 1.4 * omega * s + omega**2
     expected = np.exp(-0.004 * s) * omega**2 * platform / (loop - pull * platform)
@@ -131,6 +153,9 @@ def test_a_mass_that_swings_on_the_platform_pulls_at_its_loop(
     found = phasor(got[:, Y], t, frequency, 8.0)
     assert abs(found - expected) < 2e-3 * abs(expected)
     assert phasor(got[:, ACCELERATION], t, frequency, 8.0) == pytest.approx(s**2 * found, rel=2e-2)
+    table = ShakingTable(frequency=15.0, damping_ratio=0.7, delay=0.004)
+    said = transfer.displacement(np.array([s]), DT, table, more)[0]
+    assert said == pytest.approx(expected / 5e-3, rel=1e-9)
 
 
 @pytest.mark.parametrize("sharpness", [math.inf, 3.0])

@@ -3,9 +3,11 @@
     Y(s) = ω_o²/(s² + 2ζ_o·ω_o·s + ω_o²)·Y_loop(s),    ω_o = 2π·frequency, ζ_o = damping
 
 A loop that measures the platform itself, or its pressure, leaves a part of the resonance only; so do a specimen that
-swings on the platform, and the foundation. The parameter `law` chooses that formula:
+swings on the platform, and the foundation. A platform that its loop moves through a spring and a dashpot, as a soft
+fixture, is late by no 2ζ_o/ω_o. The parameter `law` chooses these formulas:
 
     1   Y(s) = (1 − share + share·ω_o²/(s² + 2ζ_o·ω_o·s + ω_o²))·Y_loop(s)
+    2   Y(s) = (2ζ_o·ω_o·s + ω_o²)/(s² + 2ζ_o·ω_o·s + ω_o²)·Y_loop(s)
 
 Not to be confused with `table.bandwidth`: the resonance raises amplitudes near its own frequency.
 """
@@ -36,7 +38,10 @@ EFFECT = sets(
         ),
     },
     further={
-        "": which_law(1.0, "0 the whole motion passes through the resonance, 1 a share of it"),
+        "oil_law": which_law(
+            2.0,
+            "0 the whole motion passes through the resonance, 1 a share of it, 2 its dashpot moves with the loop",
+        ),
         "oil_share": Parameter(
             "share",
             "",
@@ -51,6 +56,7 @@ EFFECT = sets(
     laws=(
         Law("whole", {"damping": 0.1}),
         Law("in part", {"damping": 0.05, "share": 0.1}),
+        Law("on a spring and a dashpot", {"damping": 0.1}),
     ),
     says="a resonance on top of the table's loop",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",

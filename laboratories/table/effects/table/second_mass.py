@@ -7,8 +7,10 @@ The loop of the plan moves all of the mass. The parameter `law` chooses what a l
 
     0   its stiffness, as above
     1   its flow, as a valve does or a motor's loop of speed: ÿ = ω²·(u − y) − 2ζω·ẏ + share/(1 − share)·(ω₂²/ω)·ẇ
+    2   its stiffness, which moved the platform alone when the plan's loop was found:
+        ÿ = ω²·(u − y) − 2ζω·ẏ + share/(1 − share)·(ω₂²·w + 2ζ₂ω₂·ẇ)
 
-The motion has a notch at the frequency of the mass under both, and a peak beside it. Not to be confused with
+The motion has a notch at the frequency of the mass under all, and a peak beside it. Not to be confused with
 `table.oil_column`, which has the peak first, or with `table.payload`: that is the force of the active mass damper.
 """
 
@@ -58,11 +60,14 @@ EFFECT = sets(
         ),
     },
     further={
-        "second_law": which_law(1.0, "0 the loop opposes its stiffness, 1 its flow"),
+        "second_law": which_law(
+            2.0, "0 the loop opposes its stiffness, 1 its flow, 2 its stiffness, found without the mass"
+        ),
     },
     laws=(
         Law("against a stiffness", {"share": 0.1, "damping": 0.08}),
         Law("against a flow", {"share": 0.1, "damping": 0.08}),
+        Law("on a platform by itself", {"share": 0.1, "damping": 0.08}),
     ),
     says="a mass that swings on the platform pulls at the table's loop",
     reference="Conte, Trombetti, Earthquake Engng Struct. Dyn. 29 (2000) 1375-1404",
