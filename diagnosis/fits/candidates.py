@@ -14,7 +14,7 @@ import numpy as np
 from diagnosis.fits import contact, fitting
 from diagnosis.fits.fitting import TIED, Fit, everywhere, excess
 from diagnosis.fits.hypothesis import Values
-from diagnosis.fits.laws.best import begun, descended, in_best_laws, raced
+from diagnosis.fits.laws.best import as_specimens, begun, descended, in_best_laws, raced
 from diagnosis.fits.laws.loop import single
 from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.scales import Scales
@@ -140,7 +140,7 @@ def best_laws(fit: Fit, scales: Scales) -> list[Fit]:
     fits = with_stop(fit, extended(fit, scales))
     if fit.names and fits and excess(fits[0]) > (1.0 - BARELY) * excess(fit):
         return fits
-    return in_best_laws(fits)
+    return in_best_laws(fits if fit.names else as_specimens(fit, fits))
 
 
 def without(fit: Fit, name: str) -> Fit:

@@ -235,7 +235,8 @@ def under_unlike(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:
         item for item in unlike_first(fitting.begun(other), scales) if item.effect.name not in fit.values
     ]
     starts = [({item.effect.name: item.values}, item.z) for item in found[:TRIED]]
-    return each(lambda start: descended(fitting.fit(fit.data, start[0], start[1], STEPS)), starts)
+    tried = each(lambda start: fitting.fit(fit.data, start[0], start[1], STEPS), starts)
+    return each(descended, [item for item in tried if fitting.near(item, fit)])
 
 
 def two_for_one(fit: Fit, rivals: Sequence[Fit], scales: Scales, most: int) -> Fit:

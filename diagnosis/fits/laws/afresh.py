@@ -12,7 +12,10 @@ from diagnosis.fits.fitting import TIED, Fit
 from diagnosis.fits.laws.best import LEADING, ROUGH, ROUNDS, STEPS, cheapest, cost, descended, fitted
 from diagnosis.fits.laws.starts import gridded
 from diagnosis.fits.scales import Scales
+from diagnosis.fits.screening import Plane
 from diagnosis.fits.threads import each
+
+HOPEFUL = 16  # of all laws, those that promise most at their best start, of which a fit is begun
 
 
 def afresh(fit: Fit, scales: Scales) -> list[Fit]:
@@ -24,7 +27,16 @@ def afresh(fit: Fit, scales: Scales) -> list[Fit]:
         for place, law in enumerate(effect.laws)
         if not law.model
     ]
-    begun = each(lambda grid: fitted(cheapest(bare, grid), ROUGH, 1), [grid for grid in starts if grid])
+    laid = each(lambda grid: cheapest(bare, grid), [grid for grid in starts if grid])
+    plane = Plane(bare)
+
+    def promised(item: Fit) -> float:
+        (name,) = item.names
+        change = (item.reduced - bare.reduced).ravel()
+        return plane.gain(change, scales.stretch(item.data.catalogue[name]))[0]
+
+    hopeful = sorted(laid, key=promised, reverse=True)[:HOPEFUL]
+    begun = each(lambda item: fitted(item, ROUGH, 1), hopeful)
     leading = each(lambda item: fitted(item, STEPS, ROUNDS), sorted(begun, key=cost)[:LEADING])
     ended = each(lambda item: descended(item) if fitting.near(item, fit) else item, leading)
     return sorted((item for item in ended if item.cost < fit.cost - TIED), key=cost)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -51,6 +52,32 @@ def in_best_laws(fits: list[Fit], *, modelled: bool = True) -> list[Fit]:
     others = raced([item for item in fits if excess(item) <= FARTHEST * excess(fits[0])], modelled=modelled)
     better = ending(sorted((others.get(item.names[-1], item) for item in fits), key=cost), fits)
     return sorted([under_the_first(better[0]), *better[1:]], key=cost)
+
+
+def as_specimens(bare: Fit, fits: list[Fit]) -> list[Fit]:
+    """Fits with one effect, best first, and with those that are the whole specimen under a further law.
+
+    An effect beside the planned specimen may promise little where it is right in that one's place: a slider behind a
+    fixture follows no friction beside a spring. Effects that come near the best fit under their first law are there.
+    """
+    way = path(bare.data.part)
+    if way is None or not fits or whole(fits[0]):
+        return fits
+    near = {item.names[-1] for item in fits if excess(item) <= FARTHEST * excess(fits[0])}
+    missing = [one for one in bare.data.part.candidates if models_of(one) and one.name not in near]
+    found = [fitted(start, STEPS, ROUNDS) for effect in missing for start in modelled(bare, effect, way)[:1]]
+    others = [item for item in fits if item.names[-1] not in {one.names[-1] for one in found}]
+    return sorted([*found, *others], key=cost)
+
+
+def modelled(bare: Fit, effect: Effect, way: tuple[Array, Array]) -> list[Fit]:
+    """The fit with an effect under those of its laws that are models of the specimen, best first."""
+    known = follow(bare.data.part, way, sorted(models_of(effect)))
+    followed = {model: item.parameters for model, item in known.items()}
+    (strength,) = (item for item in effect.parameters if not item.shape)
+    plain = replace(bare, values={effect.name: effect.values({strength.name: strength.most})})
+    places = [place for place, law in enumerate(effect.laws) if place and law.model in followed]
+    return sorted((begun_under(plain, place, followed) for place in places), key=cost)
 
 
 def whole(fit: Fit) -> bool:
