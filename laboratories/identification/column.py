@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from common.errors import InputError
 from laboratories.identification import checks, estimate
-from laboratories.identification.estimate import Estimate
+from laboratories.identification.estimate import Estimate, Identified
 from models.registry import Array
 
 LEAST = 20  # samples of a regression line: with fewer its interval is very uncertain
@@ -80,10 +80,21 @@ def cycles(deformation: Array, force: Array, amplitudes: Sequence[float]) -> Cyc
 
 def slope(deformation: Array, force: Array) -> Estimate:
     """Slope (N/m) of the regression line of the force, with its interval."""
-    base = np.column_stack([deformation, np.ones(deformation.size)])
+    return regression({"stiffness": (deformation, "N/m")}, force)["stiffness"]
+
+
+def regression(causes: Mapping[str, tuple[Array, str]], force: Array) -> Identified:
+    """The force (n,) N as a constant and a sum of multiples of causes (n,), by name with the multiple's unit."""
+    base = np.column_stack([*(values for values, _ in causes.values()), np.ones(force.size)])
     weights = np.linalg.lstsq(base, force, rcond=None)[0]
-    deviations, freedom = estimate.deviations(base, base @ weights - force, [force.size])
-    return estimate.around(float(weights[0]), float(deviations[0]), "N/m", freedom)
+    missed = base @ weights - force
+    deviations, freedom = estimate.deviations(base, missed, [force.size])
+    rows = zip(causes.items(), weights, deviations, strict=False)
+    found = {
+        name: estimate.around(float(weight), float(deviation), unit, freedom)
+        for (name, (_, unit)), weight, deviation in rows
+    }
+    return Identified(found, float(np.std(missed) / np.std(force)))
 
 
 def reversals(signal: Array, threshold: float) -> list[int]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from common.errors import InputError
 from common.plan.plan import Plan
-from common.recording.imported import logged_alone
+from common.recording.imported import imported, is_static, logged_alone
 from common.recording.run import Run
 from common.roles import kind_of, name_of
 from laboratories.device import Device
@@ -90,13 +90,17 @@ def plain(found: dict[str, Estimate]) -> dict[str, dict[str, Any]]:
     return result
 
 
-def of_column(run: Run, _interval: float) -> dict[str, Any]:
-    """Elastic stiffness; with a static cyclic test also every cycle."""
+def of_column(run: Run, interval: float) -> dict[str, Any]:
+    """Elastic stiffness, with the dashpot where the plan has one; with a static cyclic test also every cycle."""
     columns = run.columns[topic_of(run, "column")]
-    deformation, force = columns["column_displacement"], columns["column_force"]
+    deformation, force = seen(run, "column", "column_force", "column_displacement"), columns["column_force"]
     static = [segment for segment in segments(run) if segment.name == "static"]
     if not static:
-        return {"parameters": plain({"stiffness": column.slope(deformation, force)})}
+        plan, causes = plan_of(run), {"stiffness": (deformation, "N/m")}
+        if plan is not None and plan.column.damping > 0.0 and not is_static(run):
+            causes["damping"] = np.gradient(deformation, interval), "N·s/m"
+        fit = column.regression(causes, force)
+        return {"parameters": plain(fit.parameters), "nrmse": fit.nrmse}
     part = slice(static[0].begin, static[0].end)
     amplitudes = [value for name, value in static[0].values.items() if name.startswith("amplitude")]
     found = column.cycles(deformation[part], force[part], amplitudes)
@@ -114,7 +118,8 @@ def of_actuator(run: Run, interval: float) -> dict[str, Any]:
     columns = run.columns[topic_of(run, "actuator")]
     plan, measured = plan_of(run), columns["column_displacement"]
     held = plan is not None and plan.actuator.command == "held"
-    command = columns["actuator_command"] if held else written(run, columns["actuator_command"])
+    given = seen(run, "actuator", "column_displacement", "actuator_command")
+    command = given if held else written(run, given)
     fit = actuator.least_squares(command, measured, interval, held=held)
     result: dict[str, Any] = {"parameters": plain(fit.parameters), "nrmse": fit.nrmse}
     if plan is not None and plan.actuator.model == "servo_hydraulic":
@@ -127,6 +132,19 @@ def of_actuator(run: Run, interval: float) -> dict[str, Any]:
         found = step_response.tangents(columns["t"], command, measured, begins, length, held=held)
         result["tangent"] = plain(found._asdict())
     return result
+
+
+def seen(run: Run, part: str, reading: str, given: str) -> Array:
+    """What a part is given (ticks,) behind the filter and the delay with which a logger recorded one of its readings.
+
+    A part that is linear then answers as it was read. What was recorded of a given signal itself behind a filter or a
+    delay was that signal already.
+    """
+    topic = topic_of(run, part)
+    values, stated = run.columns[topic][given], imported(run)
+    if stated is None or stated.channel(topic, given) == stated.channel(topic, reading):
+        return values
+    return stated.channel(topic, reading).through(values, interval_of(run))
 
 
 def written(run: Run, command: Array) -> Array:
@@ -144,7 +162,8 @@ def step_ticks(command: Array, segment: ProgrammeSegment) -> list[int]:
 def of_table(run: Run, interval: float) -> dict[str, Any]:
     """Frequency, damping ratio and dead time; bandwidth where the motion covers it."""
     columns = run.columns[topic_of(run, "table")]
-    command, measured = written(run, columns["table_command"]), columns["table_displacement"]
+    command = written(run, seen(run, "table", "table_displacement", "table_command"))
+    measured = columns["table_displacement"]
     fit = table.least_squares(command, measured, interval)
     result: dict[str, Any] = {"parameters": plain(fit.parameters), "nrmse": fit.nrmse}
     sweeps = [segment for segment in segments(run) if segment.name == "sweep"]
@@ -162,17 +181,17 @@ def of_damper(run: Run, interval: float) -> dict[str, Any]:
     """
     columns = run.columns[topic_of(run, "damper")]
     plan = plan_of(run)
-    still = part_of(run) == "damper"
+    still, ridden = part_of(run) == "damper", "table_acceleration"
     force = columns.get("damper_force")
     # The motor's gain cannot be separated from the mass without a measured force.
     free = [name for name in damper.NAMES if name != "gain" or force is not None]
     absent = ("stiffness", "motor_time_constant")
     free = [name for name in free if not (plan and name in absent and getattr(plan.damper, name) == 0.0)]
     fit = damper.least_squares(
-        columns["damper_command"],
+        seen(run, "damper", "damper_stroke", "damper_command"),
         columns["damper_stroke"],
         force,
-        None if still else columns.get("table_acceleration"),
+        None if still or ridden not in columns else seen(run, "damper", "damper_stroke", ridden),
         interval,
         free=free,
         nominal=plan.damper if plan else None,

@@ -16,6 +16,14 @@ from report.text.progress import Progress
 
 PARTS = ("column", "actuator", "table", "damper")
 OF_SLAVE = ("table", "damper")
+LARGE = 0.05  # misfit of a model over its signal, from which on its parameters mean little
+UNDETERMINED = 1e6  # times its lower end, from which on an interval says nothing
+UNITS = {
+    "push": "N",
+    "pull": "N",
+    "play": "m",
+    "corner": "m",
+}  # of parameters of specimen models, others by their names
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,8 +65,6 @@ def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
     recording = read(args.file)
     if args.plan:
         return devices(recording, args.plan, tell)
-    tell(f"column, model {args.fit}" if args.fit else "", 0, 0)
-    models = [fitted(recording, args.fit)] if args.fit else []
     reports = []
     roles = recording.roles or (MASTER,)
     for role in roles:
@@ -74,7 +80,19 @@ def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
             f"{args.file} does not hold inputs and outputs of any part: see rths inspect {args.file}, and give "
             "--plan PLAN for a kind of laboratory of your own."
         )
-    return reports + models
+    model = args.fit or planned_model(recording, [report["part"] for report in reports])
+    tell(f"column, model {model}" if model else "", 0, 0)
+    return reports + ([fitted(recording, model)] if model else [])
+
+
+def planned_model(recording: Any, parts: list[str]) -> str:
+    """The model of a specimen that the plan has for the column, where that was identified and is no spring."""
+    from models.specimens import SPECIMENS
+    from report.facts.laboratories import plan_of
+
+    plan = plan_of(recording)
+    model = plan.column.model if plan is not None and "column" in parts else ""
+    return model if model in SPECIMENS and model != "linear" else ""
 
 
 def devices(recording: Any, plan_name: str, tell: Tell) -> list[dict[str, Any]]:
@@ -115,10 +133,21 @@ def fitted(recording: Any, model: str) -> dict[str, Any]:
         raise InputError(f"{recording.path} has no column_displacement and column_force to fit '{model}' to.")
     found = fit(model, columns["column_displacement"], columns["column_force"])
     parameters = {
-        name: {"value": value, "low": found.intervals[name][0], "high": found.intervals[name][1], "unit": ""}
+        name: {"value": value} | determined(*found.intervals[name]) | {"unit": unit_of(name)}
         for name, value in found.parameters.items()
     }
     return {"part": f"column, model {model}", "parameters": parameters, "nrmse": found.nrmse}
+
+
+def determined(low: float, high: float) -> dict[str, float | None]:
+    """The ends of an interval, none where the motion does not determine the parameter."""
+    known = not 0.0 < low * UNDETERMINED < high
+    return {"low": low if known else None, "high": high if known else None}
+
+
+def unit_of(name: str) -> str:
+    """The unit of a specimen model's parameter."""
+    return "N/m" if name == "stiffness" else UNITS.get(name, "m" if name.endswith("displacement") else "")
 
 
 def show(report: dict[str, Any]) -> None:
@@ -138,6 +167,7 @@ def show(report: dict[str, Any]) -> None:
         sys.stdout.write(f"parameters are those of the {report['model']}\n")
     if "nrmse" in report:
         sys.stdout.write(f"misfit (NRMSE): {misfit(report['nrmse'])}\n")
+        sys.stdout.write(remark(report["nrmse"]))
     if "bandwidth" in report:
         band = report["bandwidth"]
         sys.stdout.write(
@@ -158,6 +188,18 @@ def misfit(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{name} {number:.4f}" for name, number in value.items())
     return f"{value:.4f}"
+
+
+def remark(value: Any) -> str:
+    """A sentence on a model that leaves much of a signal, empty for one that does not."""
+    missed = value if isinstance(value, dict) else {"the signal": value}
+    worst = max(missed, key=lambda name: missed[name])
+    if missed[worst] < LARGE:
+        return ""
+    return (
+        f"The model leaves {100.0 * missed[worst]:.0f} % of {worst}: the part does something else as well, so that the "
+        "intervals do not hold; rths diagnose looks for what it is.\n"
+    )
 
 
 def show_cycles(cycles: list[dict[str, Any]]) -> None:
