@@ -34,7 +34,7 @@ def cause(report: Report) -> tuple[str, str]:
     if not report.which:
         return MISSING, "nothing named"
     first = report.which[0]
-    return wording.effects(first.effects), f"probability {probability(first.probability)}"
+    return wording.candidate(first.effects, report.status), f"probability {probability(first.probability)}"
 
 
 def closed(report: Report) -> str:

@@ -111,7 +111,7 @@ def which(report: Report) -> list[str]:
         found = wording.parameters(item)
         several = len(item.effects) > 1
         texts = [setting(*each, several=several) for each in found]
-        head = f"{probability(item.probability):>6}  {wording.effects(item.effects)}"
+        head = f"{probability(item.probability):>6}  {wording.candidate(item.effects, report.status)}"
         text = head + (": " + ", ".join(texts) if texts else "")
         lines += textwrap.wrap(
             text,

@@ -71,7 +71,7 @@ def nothing(report: Report) -> str:
 def card(place: int, item: Candidate | Evidence, report: Report) -> Card:
     """One candidate."""
     return Card(
-        f"{place}. {wording.effects(item.effects)}",
+        f"{place}. {wording.candidate(item.effects, report.status)}",
         item.effects,
         "; ".join(filter(None, map(wording.says, item.effects))),
         bar(item.probability, probability(item.probability)),

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from common.roles import MASTER, SLAVE, title
 from diagnosis.report.evidence import Evidence
-from diagnosis.report.records import Candidate, PartOfGap, Report, SignalGap, Tolerance
+from diagnosis.report.records import Candidate, PartOfGap, Report, SignalGap, Status, Tolerance
 from diagnosis.report.values import Value
 from laboratories import effects as catalogue
 from laboratories.effects import CATALOGUE
@@ -92,6 +92,11 @@ def effect(name: str) -> str:
 def effects(names: Sequence[str]) -> str:
     """A candidate, one effect or several together."""
     return " + ".join(map(effect, names)) or "no effect"
+
+
+def candidate(names: Sequence[str], status: Status) -> str:
+    """A candidate in a report of a status: where a gap is left to explain, none is none of the catalogue."""
+    return effects(names) if names or status in QUIET else "no effect of the catalogue"
 
 
 def says(name: str) -> str:
