@@ -118,7 +118,9 @@ class TableEffects:
     second_frequency: float = math.inf  # Hz, of a mass that swings on the platform
     second_share: float = 0.1  # of the mass that the loop moves
     second_damping: float = 0.03  # ratio at that frequency
-    second_law: float = 0.0  # 0 the loop opposes its stiffness, 1 its flow, 2 that of a platform without the mass
+    second_law: float = (
+        0.0  # 0 the loop opposes its stiffness, 1 its flow, 2 that of a platform without the mass
+    )
     velocity_limit: float = math.inf  # m/s, at which the loop's valve is open
     velocity_limit_sharpness: float = math.inf  # with which the speed bends there
     compliance: float = 0.0  # m/N

@@ -83,3 +83,12 @@ def converted(number: Decimal, given: str, unit: str | None, name: str) -> float
         raise PlanError(f"{name} is in {given}, which does not fit: give it {wanted}.") from None
     except ANY as error:
         raise unknown from error
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit, as of a logger's column."""
+    try:
+        converted(Decimal(1), text, None, "")
+    except PlanError:
+        return False
+    return bool(text)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import itertools
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,21 +15,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
-from report.text.text_form import SPACES, UNSTATED, StatedForm, TextForm, is_number, recognised, split
+from common.plan.units import is_unit
+from report.text.cells import numbers, times
+from report.text.text_form import (
+    SPACES,
+    UNSTATED,
+    StatedForm,
+    TextForm,
+    is_number,
+    recognised,
+    split,
+    unmarked,
+)
 
 Columns = dict[str, NDArray[np.float64]]
 
 READABLE = (".csv", ".txt", ".tsv", ".parquet", ".mat", ".npz")
 WRITABLE = (".csv", ".parquet", ".mat")
+WIDE = "utf-16"  # the encoding in which some loggers for Windows write
 MAT_NAME = 63  # characters that MATLAB allows
+BRACKETS = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
+
+
+class Indexed(NamedTuple):
+    """How a program takes a column or a row out of a matrix: a form for its name and number, and the first number."""
+
+    column: str
+    row: str
+    first: int
+
+
+MATLAB, NUMPY = Indexed("{}(:,{})", "{}({},:)", 1), Indexed("{}[:,{}]", "{}[{},:]", 0)
 
 
 class DataTable(NamedTuple):
     """The columns of a file."""
 
     columns: Columns
-    units: dict[str, str]  # of the columns that have a unit in a row below the names
+    units: dict[
+        str, str
+    ]  # of the columns that have one in a row below the names, or in brackets in their name
     form: TextForm | None = None  # of a text file
+    twice: frozenset[str] = frozenset()  # names of more than one column
 
 
 def read(path: Path) -> Columns:
@@ -35,7 +65,7 @@ def read(path: Path) -> Columns:
 
 
 def read_table(path: Path, form: StatedForm = UNSTATED) -> DataTable:
-    """Numeric columns by name, with units where a text file has a row of them below the names.
+    """Numeric columns by name, with units where a text file has a row of them below the names, or in these.
 
     What the `form` of a text file leaves open is recognised.
 
@@ -61,31 +91,68 @@ def read_table(path: Path, form: StatedForm = UNSTATED) -> DataTable:
 
 
 def _read_text(path: Path, stated: StatedForm) -> DataTable:
-    """A text file in UTF-8, or in Latin-1 as older loggers write it."""
-    from pyarrow import csv as arrow
-
+    """A text file in UTF-8, in UTF-16 with its mark, or in Latin-1 as older loggers write it."""
     encoding = _encoding(path)
     form = recognised(path, encoding, stated)
-    units = _units(path, form, encoding)
-    table = arrow.read_csv(
-        _single_spaced(path, encoding) if form.separator == SPACES else path,
-        arrow.ReadOptions(
-            skip_rows=form.skip_rows, skip_rows_after_names=1 if units else 0, encoding=encoding
-        ),
-        arrow.ParseOptions(delimiter=form.separator),
-        arrow.ConvertOptions(decimal_point=form.decimal),
+    below = _units(path, form, encoding)
+    table = _arrow_table(path, form, encoding, units=bool(below))
+    names = [unmarked(name).strip() for name in table.column_names]
+    columns = _numeric(table.rename_columns(names), form.decimal)
+    units = {name: in_name(name) for name in columns} | below
+    twice = frozenset(name for name in columns if names.count(name) > 1)
+    return DataTable(
+        columns, {name: unit for name, unit in units.items() if name in columns and unit}, form, twice
     )
-    columns = _numeric(table)
-    return DataTable(columns, {name: unit for name, unit in units.items() if name in columns and unit}, form)
 
 
-def _single_spaced(path: Path, encoding: str) -> io.BytesIO:
-    """The text with one space between columns and none at either end of a line."""
+def _arrow_table(path: Path, form: TextForm, encoding: str, *, units: bool) -> Any:
+    """The rows of a text file below its names; what a logger wrote behind the last row is left out."""
+    import pyarrow as pa
+    from pyarrow import csv as arrow
+
+    short: list[Any] = []  # rows with another number of cells
+
+    def read(*, skips: bool) -> Any:
+        def invalid(row: Any) -> str:
+            short.append(row)
+            return "skip"
+
+        return arrow.read_csv(
+            _source(path, form, encoding),
+            arrow.ReadOptions(
+                skip_rows=form.skip_rows,
+                skip_rows_after_names=1 if units else 0,
+                encoding="utf-8" if encoding == WIDE else encoding,
+                use_threads=not skips,  # else rows have no numbers
+            ),
+            arrow.ParseOptions(delimiter=form.separator, invalid_row_handler=invalid if skips else None),
+            arrow.ConvertOptions(decimal_point=form.decimal),
+        )
+
+    try:
+        return read(skips=False)
+    except pa.ArrowInvalid:
+        table = read(skips=True)
+        if not short or short[0].number <= table.num_rows:  # not behind the last row with all cells
+            raise
+        return table
+
+
+def _source(path: Path, form: TextForm, encoding: str) -> Path | io.BytesIO:
+    """What a reader of narrow characters and single separators reads: a file, or its text as it needs it."""
+    if encoding != WIDE and form.separator != SPACES:
+        return path
     with path.open(encoding=encoding) as stream:
-        return io.BytesIO("\n".join(SPACES.join(line.split()) for line in stream).encode(encoding))
+        lines = (line.rstrip("\n") for line in stream)
+        if form.separator == SPACES:
+            lines = (SPACES.join(unmarked(line).split()) for line in lines)
+        return io.BytesIO("\n".join(lines).encode("utf-8" if encoding == WIDE else encoding))
 
 
 def _encoding(path: Path) -> str:
+    with path.open("rb") as binary:
+        if binary.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+            return WIDE
     try:
         with path.open(encoding="utf-8") as stream:
             while stream.read(1 << 20):
@@ -102,9 +169,15 @@ def _units(path: Path, form: TextForm, encoding: str) -> dict[str, str]:
     rows = split(lines, form.separator)
     if len(rows) < 2 or not any(cell.strip() for cell in rows[1]):
         return {}
-    if any(is_number(cell, form.decimal) for cell in rows[1]):
+    if any(is_number(cell, form.decimal) for cell in rows[1]) or times(rows[1][:1]) is not None:
         return {}
     return {name.strip(): unit.strip().strip("[]()") for name, unit in zip(*rows, strict=False)}
+
+
+def in_name(name: str) -> str:
+    """The unit in brackets at the end of a column's name; empty where there is none."""
+    found = BRACKETS.search(name)
+    return found[1].strip() if found and is_unit(found[1].strip()) else ""
 
 
 def _read_parquet(path: Path) -> Columns:
@@ -113,14 +186,21 @@ def _read_parquet(path: Path) -> Columns:
     return _numeric(parquet.read_table(path))
 
 
-def _numeric(table: Any) -> Columns:
+def _numeric(table: Any, decimal: str = ".") -> Columns:
     import pyarrow as pa
 
     columns: Columns = {}
     for name, column in zip(table.column_names, table.columns, strict=True):
-        numeric = pa.types.is_integer(column.type) or pa.types.is_floating(column.type)
-        if numeric and name.strip():  # a column without a name cannot be asked for
+        if not name.strip():  # a column without a name cannot be asked for
+            continue
+        if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
             columns[name.strip()] = np.array(column.to_numpy(), dtype=np.float64)
+        elif pa.types.is_string(column.type) or pa.types.is_temporal(column.type):
+            cells = ["" if cell is None else cell for cell in column.cast(pa.string()).to_pylist()]
+            found = times(cells)
+            found = numbers(cells, decimal) if found is None else found
+            if found is not None:
+                columns[name.strip()] = found
     return columns
 
 
@@ -128,19 +208,33 @@ def _read_mat(path: Path) -> Columns:
     from scipy.io import loadmat
 
     items = loadmat(path, squeeze_me=True)
-    return {
-        name: np.asarray(value, dtype=np.float64)
-        for name, value in items.items()
-        if not name.startswith("__")
-        and isinstance(value, np.ndarray)
-        and value.ndim == 1
-        and value.dtype.kind in "iuf"
-    }
+    return _of_arrays({name: value for name, value in items.items() if not name.startswith("__")}, MATLAB)
 
 
 def _read_npz(path: Path) -> Columns:
     with np.load(path) as archive:
-        return {name: archive[name].astype(np.float64) for name in archive.files if archive[name].ndim == 1}
+        return _of_arrays({name: archive[name] for name in archive.files}, NUMPY)
+
+
+def _of_arrays(items: Mapping[str, Any], indexed: Indexed) -> Columns:
+    """Columns of arrays by name; those of a matrix, along its longer side, as its program takes them out.
+
+    What a struct holds has the struct's name, a point, and its own.
+    """
+    columns: Columns = {}
+    for name, value in items.items():
+        array = np.asarray(value)
+        if array.dtype.names and array.size == 1:
+            held = {f"{name}.{field}": array[field].item() for field in array.dtype.names}
+            columns |= _of_arrays(held, indexed)
+        elif array.dtype.kind in "iuf" and array.ndim == 2 and min(array.shape) > 1:
+            tall = array.shape[0] >= array.shape[1]
+            form = indexed.column if tall else indexed.row
+            numbered = enumerate(array.T if tall else array, indexed.first)
+            columns |= {form.format(name, k): row.astype(np.float64) for k, row in numbered}
+        elif array.dtype.kind in "iuf" and array.ndim in (1, 2) and array.size > 1:
+            columns[name] = array.ravel().astype(np.float64)
+    return columns
 
 
 def write(

@@ -9,9 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from report.text.cells import number
+
 SPACES = " "  # a separator of any number of spaces, as in columns that are printed below each other
 SEPARATORS = (",", ";", "\t", SPACES)
 DECIMALS = (".", ",")
+MARKS = "#%"  # of a comment, in NumPy and in MATLAB, before the names
 LOOKED_AT = 200  # rows in which a form is recognised: a preamble of a logger has some tens
 
 Rows = list[list[str]]
@@ -47,7 +50,7 @@ def recognised(path: Path, encoding: str, stated: StatedForm) -> TextForm:
         for decimal in ([stated.decimal] if stated.decimal else DECIMALS)
         if separator != decimal
     ]
-    tried = [(form, split(lines, form.separator)) for form in forms]
+    tried = [(form, without_end(split(lines, form.separator), form.decimal)) for form in forms]
     form, rows = max(tried, key=lambda one: numeric_columns(one[1], one[0].decimal))
     skipped = names_row(rows, form.decimal, stated.columns) if stated.skip_rows is None else stated.skip_rows
     return form._replace(skip_rows=skipped)
@@ -55,9 +58,20 @@ def recognised(path: Path, encoding: str, stated: StatedForm) -> TextForm:
 
 def split(lines: Sequence[str], separator: str) -> Rows:
     """The cells of each line."""
+    lines = [unmarked(line) for line in lines]
     if separator == SPACES:
         return [line.split() for line in lines]
     return list(csv.reader(io.StringIO("".join(lines)), delimiter=separator))
+
+
+def without_end(rows: Rows, decimal: str) -> Rows:
+    """The rows up to the last one with numbers in as many cells as most of them: behind it a logger writes texts."""
+    widths = [len(row) for row in rows if has_number(row, decimal)]
+    if not widths:
+        return rows
+    width = max(widths, key=widths.count)
+    last = max(place for place, row in enumerate(rows) if len(row) == width and has_number(row, decimal))
+    return rows[: last + 1]
 
 
 def numeric_columns(rows: Rows, decimal: str) -> int:
@@ -104,10 +118,10 @@ def is_head(row: Sequence[str], body: Rows) -> bool:
 
 def is_number(cell: str, decimal: str) -> bool:
     """Whether a cell holds a number with this decimal sign."""
-    if decimal != "." and "." in cell:
-        return False
-    try:
-        float(cell.replace(decimal, "."))
-    except ValueError:
-        return False
-    return True
+    return number(cell, decimal) is not None
+
+
+def unmarked(line: str) -> str:
+    """A line without the mark of a comment before it, with which some programs write the names."""
+    bare = line.lstrip()
+    return bare.lstrip(f"{MARKS} ") if bare.startswith(tuple(MARKS)) else line

@@ -122,7 +122,7 @@ def show(
         )
     if found.units:
         units = (f"{name} in {unit}" for name, unit in found.units.items())
-        say(f"units, from the row below the names: {', '.join(units)}\n")
+        say(f"units, from the row below the names or from brackets in them: {', '.join(units)}\n")
     if found.interpolated:
         say(f"interpolated onto the ticks, and marked so: {', '.join(found.interpolated)}\n")
     if found.clock and found.clock.between:

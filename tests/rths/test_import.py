@@ -50,7 +50,7 @@ def test_files_with_semicolons_decimal_commas_a_preamble_and_a_row_of_units_are_
         assert np.allclose(run.columns["master"]["column_displacement"], 1e-3 * LATE, atol=1e-11)
         said = capsys.readouterr().out
         assert "text: ';' between columns, decimal sign ',', 1 rows above the names" in said
-        assert "units, from the row below the names: actuator_command in mm" in said
+        assert "units, from the row below the names or from brackets in them: actuator_command in mm" in said
     assert bring(text, rows, 'time = "t"\nseparator = ","\n')[0] == 2
     assert "a map can give its separator, decimal sign and rows to skip" in capsys.readouterr().err
 

@@ -84,7 +84,9 @@ def test_a_row_of_units_holds_for_the_time_too(call: Any, capsys: Any, tmp_path:
     out = tmp_path / "a.mcap"
     assert call("import", tmp_path / "a.csv", "--map", tmp_path / "map.toml", "-o", out) == 0
     assert read(out).columns["master"]["t"].size == 400
-    assert "units, from the row below the names: time in ms" in capsys.readouterr().out
+    assert (
+        "units, from the row below the names or from brackets in them: time in ms" in capsys.readouterr().out
+    )
     (tmp_path / "a.csv").write_text(
         text.replace("ms,mm,mm", "ticks,mm,mm") + "\n"
     )  # no unit of time, so seconds

@@ -318,7 +318,7 @@ def moved(theirs: Array, values: Array, t: Array, row: Signal) -> Array:
 
 
 def scale_of(name: str, source: SignalSource, row: Signal, table: DataTable, data: Path) -> tuple[float, str]:
-    """The factor to the signal's unit; where the map gives none, from the unit in the row below the column's name."""
+    """The factor to the signal's unit; where the map gives none, from the unit below the column's name or in it."""
     unit = table.units.get(source.column, "")
     if source.scaled or not unit or row.kind is FieldType.INDEX:
         return source.scale, ""

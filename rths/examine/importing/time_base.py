@@ -13,6 +13,7 @@ from common.plan.schema import nearest
 from common.signals import TIME
 from models.registry import Array
 from report.text.tabular import DataTable
+from report.text.text_form import is_number
 from rths.examine.importing.import_map import ImportMap, in_unit
 
 ENDS = 0.02  # share of the rows that may come before a column begins, or behind its end
@@ -55,7 +56,11 @@ def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, 
     bad = np.flatnonzero(~(np.diff(t) > 0.0))
     if not mapping.static and (bad.size or t.size < 2):
         row = int(bad[0]) + 2 if bad.size else t.size
-        raise InputError(f"{data}: the time in column '{mapping.time}' does not increase at row {row}.")
+        hint = " It may be printed with too few digits: give rate, the samples per second, in its place."
+        same = bool(bad.size) and t[bad[0]] == t[bad[0] + 1]
+        raise InputError(
+            f"{data}: the time in column '{mapping.time}' does not increase at row {row}.{hint if same else ''}"
+        )
     rows = np.ones(t.size, dtype=bool)
     if mapping.start is not None:
         rows &= t >= mapping.start
@@ -136,7 +141,11 @@ def length(mapping: ImportMap, table: DataTable, data: Path) -> int:
 
 
 def pick(table: DataTable, name: str, data: Path) -> Array:
-    """A column by name; raises InputError with the nearest name where there is none."""
+    """A column by name; raises InputError with the nearest name where there is none, or where there are two."""
+    if name in table.twice:
+        raise InputError(f"{data} has more than one column '{name}': give each a name of its own.")
     if name not in table.columns:
+        if table.form and all(is_number(one, table.form.decimal) for one in table.columns):
+            raise InputError(f"{data} has no row of names: write one above the numbers, with '{name}' in it.")
         raise InputError(f"{data} has no numeric column '{name}': {nearest(name, table.columns)}")
     return table.columns[name]
