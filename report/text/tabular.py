@@ -133,7 +133,10 @@ def _arrow_table(path: Path, form: TextForm, encoding: str, *, units: bool) -> A
         return read(skips=False)
     except pa.ArrowInvalid:
         table = read(skips=True)
-        if not short or short[0].number <= table.num_rows:  # not behind the last row with all cells
+        above = form.skip_rows + 1 + units  # its rows above the first one of the table
+        if (
+            not short or short[0].number != above + table.num_rows + 1
+        ):  # not behind the last row with all cells
             raise
         return table
 

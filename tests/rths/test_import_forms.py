@@ -51,10 +51,23 @@ def test_a_cell_with_an_error_is_no_number_and_leaves_its_column(tmp_path: Path)
     assert np.array_equal(found["u"], [1.5, np.nan, 2.5], equal_nan=True)
 
 
-def test_rows_with_another_number_of_cells_are_refused_between_others(bring: Any, capsys: Any) -> None:
-    code, _ = bring("t,u,y\n0,1,2\n0.01,1,2\nsegment 2\n0.02,1,2\n0.03,1,2\n", DRIVE)
+@pytest.mark.parametrize("above", ["", "Run 7\nBench A\n"])
+@pytest.mark.parametrize("below", ["", "s,mm,mm\n"])
+@pytest.mark.parametrize("behind", [1, 2, 5])
+def test_rows_with_another_number_of_cells_are_refused_between_others(
+    above: str, below: str, behind: int, bring: Any, capsys: Any
+) -> None:
+    rows = [f"{0.01 * k:.2f},1,2\n" for k in range(8)]
+    rows.insert(len(rows) - behind, "segment 2\n")
+    code, _ = bring(f"{above}t,u,y\n{below}{''.join(rows)}", DRIVE)
     assert code == 2
     assert "Expected 3 columns, got 1: segment 2" in capsys.readouterr().err
+
+
+def test_lines_behind_the_last_row_are_left_out_below_a_preamble_and_a_row_of_units(tmp_path: Path) -> None:
+    path = tmp_path / "data.csv"
+    path.write_text("Run 7\nt,u\ns,mm\n0,1\n0.1,2\n0.2,3\n\nEnd of test\nMax\n")
+    assert read_table(path).columns["u"].tolist() == [1.0, 2.0, 3.0]
 
 
 @pytest.mark.parametrize("ending", [".mat", ".npz"])
