@@ -84,7 +84,10 @@ def slope(deformation: Array, force: Array) -> Estimate:
 
 
 def regression(causes: Mapping[str, tuple[Array, str]], force: Array) -> Identified:
-    """The force (n,) N as a constant and a sum of multiples of causes (n,), by name with the multiple's unit."""
+    """The force (n,) N as a constant and a sum of multiples of causes (n,), by name with the multiple's unit.
+
+    The misfit of a force that does not move is that of its rounding, 0.
+    """
     base = np.column_stack([*(values for values, _ in causes.values()), np.ones(force.size)])
     weights = np.linalg.lstsq(base, force, rcond=None)[0]
     missed = base @ weights - force
@@ -94,7 +97,7 @@ def regression(causes: Mapping[str, tuple[Array, str]], force: Array) -> Identif
         name: estimate.around(float(weight), float(deviation), unit, freedom)
         for (name, (_, unit)), weight, deviation in rows
     }
-    return Identified(found, float(np.std(missed) / np.std(force)))
+    return Identified(found, float(np.std(missed) / (np.std(force) or 1.0)))
 
 
 def reversals(signal: Array, threshold: float) -> list[int]:

@@ -18,12 +18,8 @@ PARTS = ("column", "actuator", "table", "damper")
 OF_SLAVE = ("table", "damper")
 LARGE = 0.05  # misfit of a model over its signal, from which on its parameters mean little
 UNDETERMINED = 1e6  # times its lower end, from which on an interval says nothing
-UNITS = {
-    "push": "N",
-    "pull": "N",
-    "play": "m",
-    "corner": "m",
-}  # of parameters of specimen models, others by their names
+# of parameters of specimen models; those of others follow from their names
+UNITS = {"push": "N", "pull": "N", "play": "m", "corner": "m"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the part (default: that of the bench test; in other recordings all that can be identified)",
     )
     parser.add_argument(
-        "--fit", metavar="MODEL", help="fit this hysteretic model to the column too (clough, bwbn, …)"
+        "--fit",
+        metavar="MODEL",
+        help="fit this hysteretic model to the column too (clough, bwbn, …; default: the plan's)",
     )
     parser.add_argument(
         "--plan",
@@ -86,13 +84,13 @@ def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
 
 
 def planned_model(recording: Any, parts: list[str]) -> str:
-    """The model of a specimen that the plan has for the column, where that was identified and is no spring."""
-    from models.specimens import SPECIMENS
+    """The model of a specimen that the plan has for the column, where that was identified and can be fitted."""
+    from models.specimens.fit import FREE
     from report.facts.laboratories import plan_of
 
     plan = plan_of(recording)
     model = plan.column.model if plan is not None and "column" in parts else ""
-    return model if model in SPECIMENS and model != "linear" else ""
+    return model if model in FREE else ""
 
 
 def devices(recording: Any, plan_name: str, tell: Tell) -> list[dict[str, Any]]:
