@@ -51,6 +51,13 @@ class ColumnEffects:
     )
     damage: float = 0.0  # growth of that peak per plastic deformation of the yield displacement
     yield_asymmetry: float = 0.0  # strength of its positive side less that of the negative one over their sum
+    strength_loss: float = 0.0  # of a degrading Bouc-Wen specimen: δ_ν, per energy over k·δ_y²
+    stiffness_loss: float = 0.0  # likewise δ_η
+    pinch_depth: float = 0.0  # ζ_s, share of its slope that pinching takes at last
+    pinch_place: float = 0.1  # q, where pinching is deepest, over the largest force
+    pinch_rate: float = 0.1  # p, at which pinching sets in, per that energy
+    pinch_width: float = 0.3  # ψ
+    pinch_spread: float = 0.5  # λ, width over depth of pinching
     concrete: float = 5.0  # of a section of layers: stiffness of the concrete over that of the bars
     axial: float = 0.0  # axial force over that at which all bars yield
     concrete_strength: float = 0.5  # over its stiffness times the bars' yield strain

@@ -64,7 +64,15 @@ def which(found: Diagnosis, signs: Mapping[str, float], sure: float = 1.0) -> Na
         for verdict in named
         for sentence in (*other_numbers(verdict), *other_causes(verdict.search), *swinging(verdict))
     ]
-    return Named((first, *others[:MOST_OTHERS]), (*ends, *as_good))
+    return Named(once([first, *others])[: 1 + MOST_OTHERS], (*ends, *as_good))
+
+
+def once(candidates: list[Candidate]) -> tuple[Candidate, ...]:
+    """The candidates without those whose effects an earlier one has too: the same ones under another law."""
+    firsts: dict[frozenset[str], Candidate] = {}
+    for item in candidates:
+        firsts.setdefault(frozenset(item.effects), item)
+    return tuple(firsts.values())
 
 
 def fitted(values: Mapping[str, Interval]) -> dict[str, Value]:

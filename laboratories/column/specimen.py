@@ -45,6 +45,7 @@ LAWS = (
     "pinched_by_rest",
     "layered",
     "bouc_wen",
+    "bwbn",
 )  # of yielding, in the order of `ColumnEffects.law`
 PLAYS = ORIGIN, RESTING, HELD, PARTLY, ROUNDED = range(5)  # where the gap is: see `column.slip`
 IN_PLACE = 2  # of `ColumnEffects.friction_law`: a slider in the place of the planned specimen
@@ -159,6 +160,11 @@ def yielding(stiffness: float, effects: ColumnEffects) -> Array:
     shape: list[float] = []  # behind stiffness, yield displacement and hardening
     if name == "bouc_wen":
         shape = [effects.exponent, effects.yield_loop, 1.0 - effects.yield_loop]
+    elif name == "bwbn":
+        loop = [effects.exponent, effects.yield_loop, 1.0 - effects.yield_loop]
+        loss = [effects.strength_loss, effects.stiffness_loss]
+        pinch = [effects.pinch_depth, effects.pinch_place, effects.pinch_rate, effects.pinch_width]
+        shape = [*loop, *loss, *pinch, 0.0, effects.pinch_spread]
     elif name == "menegotto_pinto":
         shape = [effects.exponent, 0.925, 0.15, effects.turn]
     elif name == "clough":  # which has no negative hardening

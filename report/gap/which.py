@@ -89,8 +89,8 @@ def worth(item: Candidate | Evidence) -> str:
         facts.append(f"explains {percent(item.explained)} of the gap at its part")
     score = item.score if isinstance(item, Evidence) else item.held_out_score
     if score is not None:
-        behind = abs(score)
-        facts.append("best score" if behind < 0.05 else f"{nats(behind)} worse than the best")
+        how = "worse" if score > 0.0 else "better"
+        facts.append("best score" if abs(score) < 0.05 else f"{nats(abs(score))} {how} than the verdict")
     return "; ".join(facts)
 
 

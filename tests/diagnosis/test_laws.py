@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 import numpy as np
@@ -116,6 +117,34 @@ def test_an_endochronic_column_is_yielding_by_that_law() -> None:
     assert values["loop"] == pytest.approx(1.0, abs=0.03)
     assert values["yield_displacement"] == pytest.approx(LIMIT, rel=0.03)
     assert found.chi < 1.2 * found.reduced.size
+
+
+class Degrading(Driven):
+    """A column alone that degrades and pinches, by Euler steps of a five-hundredth of the way between two ticks."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        z, energy, before, force = 0.0, 0.0, 0.0, np.empty(TICKS)
+        for tick, x in enumerate(self.inputs):
+            way = (x - before) / 500.0 / LIMIT
+            for _ in range(500):
+                nu, eta = 1.0 + 0.05 * energy, 1.0 + 0.1 * energy
+                depth = 0.8 * (1.0 - math.exp(-0.3 * energy))
+                width = 0.25 * (0.2 + depth)
+                pinch = 1.0 - depth * math.exp(-(((z * np.sign(way) - 0.2 / nu) / width) ** 2))
+                change = way * pinch * (1.0 - nu * abs(z) * (0.4 + 0.6 * np.sign(z * way))) / eta
+                z, energy = z + change, energy + 0.97 * z * way
+            force[tick], before = K * (0.03 * x + 0.97 * LIMIT * z), x
+        self.measured = (force + NOISE * np.random.default_rng(4).standard_normal(TICKS))[:, None]
+
+
+@pytest.mark.long
+def test_a_column_that_degrades_and_pinches_smoothly_is_yielding_by_that_law() -> None:
+    (found,) = in_best_laws([first_law(Degrading())])
+    values = found.values["column.yielding"]
+    assert CATALOGUE["column.yielding"].laws[int(values["law"])].model == "bwbn"
+    assert values["yield_displacement"] == pytest.approx(LIMIT, rel=0.05)
+    assert found.chi < 1.3 * found.reduced.size
 
 
 def test_the_recording_with_the_largest_deformation_starts_the_fit_of_a_law() -> None:

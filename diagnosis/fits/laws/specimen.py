@@ -17,7 +17,7 @@ from models.registry import Array
 from models.specimens import fit as specimens
 from models.specimens.fit import SpecimenFit
 
-SLOW = ("layered",)  # models whose fit takes ten times as long as another's
+SLOW = ("layered", "bwbn")  # models whose fit takes ten times as long as another's
 CLOSELY = 0.03  # of a force's rms: a model that leaves less has the specimen's loops
 UNCRACKED = "uncracked"  # of a law with a first stiffness of its own: that over the planned one
 BETTER = 0.8  # of what the best other model leaves: less of it is worth a model that takes long

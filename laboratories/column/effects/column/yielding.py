@@ -21,6 +21,8 @@ with yield displacement δ_y, hardening α and exponent n. The parameter `law` c
     12  the endochronic law (K. C. Valanis, Archives of Mechanics 23 (1971), 517-551; Z. P. Bažant and P. D. Bhat, J.
         Eng. Mech. Div. ASCE 102 (1976), 701-722), dz/dδ = (1 − |z|ⁿ·sgn(z·dδ)) / δ_y, which unloads by up to twice the
         elastic stiffness: with `loop` β in general Bouc and Wen's 1 − |z|ⁿ·(1 − β + β·sgn(z·dδ)), where 0.5 is law 0
+    13  Bouc and Wen with loss of strength and stiffness and with pinching, after Baber and Noori (1985) and Foliente
+        (1995): see `models/specimens/bwbn.py`, with γ = 1 − β and δ_ψ = 0
 
 Laws 5 to 10 may be stronger on one side, by `asymmetry`: concrete that cracks, or bars on one side only.
 
@@ -59,6 +61,25 @@ LAYERS = {
     "uncracked": 1.0,
 }
 
+DEGRADING = {
+    "strength_loss": 0.01,
+    "stiffness_loss": 0.02,
+    "pinch_depth": 0.4,
+    "pinch_place": 0.1,
+    "pinch_rate": 0.2,
+    "pinch_width": 0.3,
+    "pinch_spread": 0.5,
+}
+BABER_AND_NOORI = {
+    "strength_loss": "delta_nu",
+    "stiffness_loss": "delta_eta",
+    "pinch_depth": "zeta_s",
+    "pinch_place": "q",
+    "pinch_rate": "p",
+    "pinch_width": "psi",
+    "pinch_spread": "lambda_",
+}
+
 
 def share(name: str, null: float, least: float, says: str) -> Parameter:
     """A parameter of shape between `least` and 1 that only some of the laws have."""
@@ -68,6 +89,11 @@ def share(name: str, null: float, least: float, says: str) -> Parameter:
 def of_layers(name: str, null: float, least: float, most: float, says: str) -> Parameter:
     """A parameter of shape that only law 11 has."""
     return Parameter(name, "", null, least, most, (), f"{says}, of law 11", shape=True)
+
+
+def degrading(name: str, null: float, least: float, most: float, says: str) -> Parameter:
+    """A parameter of shape that only law 13 has."""
+    return Parameter(name, "", null, least, most, (), f"{says}, of law 13", shape=True)
 
 
 EFFECT = sets(
@@ -106,10 +132,10 @@ EFFECT = sets(
     },
     further={
         "law": which_law(
-            12.0,
+            13.0,
             "0 Bouc and Wen, 1 bilinear, 2 Menegotto and Pinto, 3 peak-oriented, 4 trilinear, 5 pinched, 6 both, "
             "7 and 8 as these with the corner by the peak, 9 and 10 by its rest, 11 layers of concrete and bars, 12 "
-            "endochronic",
+            "endochronic, 13 Bouc and Wen that degrades and pinches",
         ),
         "unloading": Parameter(
             "unloading",
@@ -216,9 +242,28 @@ EFFECT = sets(
             least=0.01,
             most=3.0,
             sizes=(),
-            says="how wide the loop of law 12 is: 0.5 unloads with the elastic stiffness, 1 with up to twice it",
+            says="width of the loop of laws 12 and 13: 0.5 unloads with the elastic stiffness, 1 with up to twice it",
             shape=True,
         ),
+        "strength_loss": degrading(
+            "strength_loss", 0.0, 0.0, 10.0, "loss of strength, of energy over k·δ_y²"
+        ),
+        "stiffness_loss": degrading(
+            "stiffness_loss", 0.0, 0.0, 10.0, "loss of stiffness, of the same energy"
+        ),
+        "pinch_depth": degrading(
+            "pinch_depth", 0.0, 0.0, 0.99, "share of the slope that pinching takes at last"
+        ),
+        "pinch_place": degrading(
+            "pinch_place", 0.1, -1.0, 1.0, "where pinching is deepest, over the strength"
+        ),
+        "pinch_rate": degrading(
+            "pinch_rate", 0.1, 0.0, 50.0, "rate at which pinching sets in, of that energy"
+        ),
+        "pinch_width": degrading(
+            "pinch_width", 0.3, 0.02, 5.0, "width of pinching over its depth and spread"
+        ),
+        "pinch_spread": degrading("pinch_spread", 0.5, 0.01, 5.0, "what is added to the depth in its width"),
     },
     laws=(
         Law("Bouc and Wen", {"hardening": 0.05, "exponent": 2.0}, "bouc_wen", {"exponent": "n"}),
@@ -253,6 +298,12 @@ EFFECT = sets(
             {"hardening": 0.05, "exponent": 2.0, "loop": 1.0},
             "bouc_wen",
             {"exponent": "n", "loop": "beta"},
+        ),
+        Law(
+            "Bouc and Wen that degrades and pinches",
+            {"hardening": 0.02, "exponent": 1.5, "loop": 0.5, **DEGRADING},
+            "bwbn",
+            {"exponent": "n", "loop": "beta", **BABER_AND_NOORI},
         ),
     ),
     says="the specimen yields",
