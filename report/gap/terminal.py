@@ -13,6 +13,7 @@ WIDTH = 100  # columns of the summary, which a usual terminal window has
 LABEL = 12  # columns of the labels on the left
 NAME = 22  # least columns of the name of a signal or a site
 BAR = 16  # columns of a bar
+FIRST = 4  # lines of the foremost candidate
 MOST = 25  # lines of the summary: one screen
 UNBROKEN = "\u00a0%"
 
@@ -107,8 +108,10 @@ def which(report: Report) -> list[str]:
     lines: list[str] = []
     if report.status == "not_enough_data":
         return row("which", "not determined")
-    for item in wording.once(report.which)[:3]:
-        found = wording.parameters(item)
+    for place, item in enumerate(wording.once(report.which)[:3]):
+        # the law says what the other parameters mean, and must not be cut off
+        order = list(item.parameters)
+        found = sorted(wording.parameters(item), key=lambda one: (order.index(one[0]), one[1] != "law"))
         several = len(item.effects) > 1
         texts = [setting(*each, several=several) for each in found]
         head = f"{probability(item.probability):>6}  {wording.candidate(item.effects, report.status)}"
@@ -116,7 +119,7 @@ def which(report: Report) -> list[str]:
         lines += textwrap.wrap(
             text,
             WIDTH - LABEL,
-            max_lines=2,
+            max_lines=2 if place else FIRST,
             placeholder=" …",
             subsequent_indent=" " * 8,
             drop_whitespace=True,
