@@ -236,7 +236,7 @@ def details() -> Report:
             candidate(
                 ["damper.motor_lag", "damper.viscous"],
                 0.02,
-                -8.3,
+                8.3,
                 parameters=lag | {"damper.viscous": {"factor": value(1.9, 1.6, 3.0, "–")}},
                 against="would grow with the frequency, which the residual does not",
                 on_bound=["factor"],

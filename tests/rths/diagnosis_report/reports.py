@@ -54,7 +54,7 @@ def explained() -> Report:
                     "damper.motor_lag": {"time_constant": value(0.0071, 0.0064, 0.0078, "s")},
                     "damper.viscous": {"factor": value(1.9, 1.6, 3.0, "–")},
                 },
-                "held_out_score": -8.3,
+                "held_out_score": 8.3,
             },
         ],
         "equivalent": [["damper.friction", "table.friction"]],
