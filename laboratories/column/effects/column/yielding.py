@@ -246,24 +246,26 @@ EFFECT = sets(
             shape=True,
         ),
         "strength_loss": degrading(
-            "strength_loss", 0.0, 0.0, 10.0, "loss of strength, of energy over k·δ_y²"
+            "strength_loss", 0.0, 0.0, 10.0, "δ_ν, loss of strength per dissipated energy over k·δ_y²"
         ),
         "stiffness_loss": degrading(
-            "stiffness_loss", 0.0, 0.0, 10.0, "loss of stiffness, of the same energy"
+            "stiffness_loss", 0.0, 0.0, 10.0, "δ_η, loss of stiffness per the same energy"
         ),
         "pinch_depth": degrading(
-            "pinch_depth", 0.0, 0.0, 0.99, "share of the slope that pinching takes at last"
+            "pinch_depth", 0.0, 0.0, 0.99, "ζ_s, share of the slope that pinching takes at last"
         ),
         "pinch_place": degrading(
-            "pinch_place", 0.1, -1.0, 1.0, "where pinching is deepest, over the strength"
+            "pinch_place", 0.1, -1.0, 1.0, "q, force at which pinching is deepest over the strength"
         ),
         "pinch_rate": degrading(
-            "pinch_rate", 0.1, 0.0, 50.0, "rate at which pinching sets in, of that energy"
+            "pinch_rate", 0.1, 0.0, 50.0, "p, rate at which pinching sets in with that energy"
         ),
         "pinch_width": degrading(
-            "pinch_width", 0.3, 0.02, 5.0, "width of pinching over its depth and spread"
+            "pinch_width", 0.3, 0.02, 5.0, "ψ, width of pinching over the sum of its depth and pinch_spread"
         ),
-        "pinch_spread": degrading("pinch_spread", 0.5, 0.01, 5.0, "what is added to the depth in its width"),
+        "pinch_spread": degrading(
+            "pinch_spread", 0.5, 0.01, 5.0, "λ, added to the depth in the width of pinching"
+        ),
     },
     laws=(
         Law("Bouc and Wen", {"hardening": 0.05, "exponent": 2.0}, "bouc_wen", {"exponent": "n"}),
