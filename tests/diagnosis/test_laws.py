@@ -191,6 +191,8 @@ def test_a_parameter_that_a_law_lacks_is_not_fitted() -> None:
         | {"concrete", "axial", "strength", "spalling", "shaft", "focus"}
         | {"core", "friction", "eccentricity", "uncracked"},
         12: {"yield_displacement", "hardening", "exponent", "loop"},
+        13: {"yield_displacement", "hardening", "exponent", "loop", "strength_loss", "stiffness_loss"}
+        | {f"pinch_{name}" for name in ("depth", "place", "rate", "width", "spread")},
     }
 
 
