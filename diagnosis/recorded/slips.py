@@ -27,6 +27,9 @@ ALIKE = 0.5  # correlation from which on two signals have the same shape: that o
 # correlation, negative, from which on a sign is wrong: sines 154° apart; less may be a wrong phase, or a mass that
 # bounces off a stop.
 OPPOSED = 0.9
+# Where a mass bounces off a stop for long it is 154° too, but not before it comes there. Share of its peak up to which
+# a reading is compared by itself, over as many times the longest lag at least.
+BEGINNING, LAGS = 0.3, 4
 # Share of the work exchanged that a specimen seems to give, from which on its sign is wrong. Where its force runs
 # against its deformation a tenth does, which no delay of a spring's force makes there. Where it has another shape, as
 # that of friction, half does: the force of a spring would be late by 60° then.
@@ -155,8 +158,18 @@ def compared(measured: Array, predicted: Array, noise: float, most: int) -> floa
     likeness = correlation(read / sizes[0], wanted / sizes[1], most)
     factor = float(sizes[0] / sizes[1])
     if likeness <= -OPPOSED:
-        return -factor
+        return None if begins_alike(read, wanted, most) else -factor
     return factor if likeness >= ALIKE else None
+
+
+def begins_alike(read: Array, wanted: Array, most: int) -> bool:
+    """Whether two signals have the same sign as long as the first one is small, which a slip does not explain."""
+    small = int(np.argmax(np.abs(read) > BEGINNING * np.max(np.abs(read))))
+    if small < LAGS * max(most, 1):
+        return False
+    one, other = (values[:small] - np.mean(values[:small]) for values in (read, wanted))
+    sizes = np.std(one), np.std(other)
+    return min(sizes) > 0.0 and correlation(one / sizes[0], other / sizes[1], most) >= OPPOSED
 
 
 def correlation(one: Array, other: Array, most: int) -> float:

@@ -141,6 +141,14 @@ def test_a_motion_against_its_prediction_is_no_wrong_sign_where_its_shape_differ
         assert (factor is not None and factor < 0.0) == wrong
 
 
+def test_a_mass_that_is_thrown_back_from_some_motion_on_has_no_wrong_sign() -> None:
+    ticks = np.arange(20_000) * 0.002
+    predicted = ticks * np.sin(2.0 * np.pi * ticks)
+    thrown = np.where(ticks < 0.3 * ticks[-1], predicted, -predicted)
+    assert slips.compared(thrown, predicted, 0.0, 50) is None
+    assert slips.compared(-predicted, predicted, 0.0, 50) == pytest.approx(-1.0)
+
+
 def test_a_force_without_a_command_is_checked_against_the_measured_deformation(
     bring: Any, capsys: Any
 ) -> None:
