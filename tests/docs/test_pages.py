@@ -88,6 +88,7 @@ UNRUN = {
         "rths blind --set loggers --seed 9670 --cases 30 --only clean --duration 12",
         "rths blind --set loggers --seed 9671 --cases 30 --only catalogue --duration 12",
         "rths blind --set loggers --seed 9672 --cases 24 --only catalogue --duration 12",
+        "rths blind --set loggers --seed 9673 --cases 30",
         "rths blind --set loggers --seed 9777 --cases 90 --only catalogue --duration 12",
         "rths blind --set out_of_step --seed 1 --cases 11 --only clean --duration 12",
         "rths blind --set out_of_step --seed 2 --cases 33 --duration 12",
