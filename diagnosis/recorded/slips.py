@@ -168,7 +168,7 @@ def begins_alike(read: Array, wanted: Array, most: int) -> bool:
     if small < LAGS * max(most, 1):
         return False
     one, other = (values[:small] - np.mean(values[:small]) for values in (read, wanted))
-    sizes = np.std(one), np.std(other)
+    sizes = float(np.std(one)), float(np.std(other))
     return min(sizes) > 0.0 and correlation(one / sizes[0], other / sizes[1], most) >= OPPOSED
 
 
