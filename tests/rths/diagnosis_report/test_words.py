@@ -7,7 +7,9 @@ from typing import Any
 
 import pytest
 
+from diagnosis.findings.which import once
 from diagnosis.report.read import report as read
+from diagnosis.report.records import Candidate
 from laboratories.effects import CATALOGUE
 from report.gap import which, wording
 from report.gap.terminal import summary
@@ -100,3 +102,25 @@ def test_the_closed_share_of_a_gap_is_shown_as_at_most_100_percent() -> None:
     assert "closed" not in next(
         line for line in summary(read(clean)).split("\n") if line.startswith("how far")
     )
+
+
+def test_the_law_of_an_effect_comes_first_on_the_terminal_and_is_not_cut_off() -> None:
+    shapes = {f"shape_{place}": {"value": 1.0, "interval": [0.5, 1.5], "unit": ""} for place in range(20)}
+    law = {"law": {"value": 13.0, "interval": None, "unit": ""}}
+    found = candidate("column.yielding") | {"parameters": {"column.yielding": shapes | law}}
+    report = read(bare("explained") | {"which": [found]})
+    words = " ".join(summary(report).split())
+    assert "column yielding: law Bouc and Wen that degrades and pinches, shape 0 1.00" in words
+
+
+@pytest.mark.parametrize(("score", "words"), [(8.3, "8.3 nats worse"), (-8.3, "8.3 nats better")])
+def test_a_score_is_said_to_be_worse_or_better_than_the_verdicts(score: float, words: str) -> None:
+    item = Candidate(effects=("damper.gain",), probability=0.1, parameters={}, held_out_score=score)
+    assert which.worth(item) == f"{words} than the verdict"
+
+
+def test_of_candidates_with_the_same_effects_the_first_is_listed() -> None:
+    given: dict[str, Any] = {"parameters": {}, "held_out_score": 0.0}
+    first, other = ("column.slip", "column.yielding"), ("column.yielding", "column.slip")
+    found = [Candidate(effects=names, probability=0.5, **given) for names in (first, first[:1], other)]
+    assert once(found) == tuple(found[:2])
