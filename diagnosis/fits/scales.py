@@ -18,7 +18,7 @@ from laboratories.effects.effect import Effect, Parameter
 
 HARD = (0.5, 5.0, 50.0)  # times the largest force over the largest stroke: an end stop from soft to hard
 USUAL_RATE = 0.05  # m/s, of a part whose motion was not recorded or is none
-FARTHEST = 4.0  # times a usual size where a search still begins
+LARGEST_START = 4.0  # times a usual size where a search still begins
 LIMITS = (0.25, 0.4, 0.55, 0.7, 0.85, 0.95)  # of what is reached: where a limit is looked for
 SWALLOWED = (0.3, 1.0)  # of what is reached: a play that takes a large part of a small motion
 INSIDE = 0.5  # of the largest play: one inside which a part may rest, and which a fit may still move
@@ -162,7 +162,7 @@ class Scales:
         strength = [item for item in effect.parameters if not item.shape]
         if any(np.isinf(item.null) for item in strength):
             return 0.5, 1.5
-        return (-FARTHEST if all(item.least < item.null for item in strength) else 0.0), FARTHEST
+        return (-LARGEST_START if all(item.least < item.null for item in strength) else 0.0), LARGEST_START
 
     def stretched(self, effect: Effect, values: dict[str, float], share: float) -> dict[str, float]:
         """The start moved to where a straight line from the null value promises most."""

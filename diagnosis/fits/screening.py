@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import NEAR, Fit
 from diagnosis.fits.laws.specimen import within
-from diagnosis.fits.scales import FARTHEST, Scales
+from diagnosis.fits.scales import LARGEST_START, Scales
 from diagnosis.fits.threads import each
 from laboratories.effects.effect import Effect
 from models.registry import Array
@@ -109,7 +109,9 @@ def look_from(
     fit = plane.fit
     moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: values}))
     gain, share, z = plane.gain((moved - fit.reduced).ravel(), scales.stretch(effect))
-    return ScreenedEffect(effect, scales.stretched(effect, values, share), z, gain), abs(share) == FARTHEST
+    return ScreenedEffect(effect, scales.stretched(effect, values, share), z, gain), abs(
+        share
+    ) == LARGEST_START
 
 
 def look_farther(item: ScreenedEffect, at_end: bool, plane: Plane, scales: Scales) -> ScreenedEffect:

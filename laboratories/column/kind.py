@@ -28,7 +28,7 @@ PARAMETERS = {  # parameters of [actuator] that have a tolerance, by its model
         "actuator.servo.delay",
     ),
 }
-FARTHEST = 4.0  # tolerances by which a parameter of a specimen's model must be free to move
+FREE = 4.0  # tolerances by which a parameter of a specimen's model must be free to move
 
 
 class ColumnKind(Kind):
@@ -77,7 +77,7 @@ class ColumnKind(Kind):
         """
         column, names = plan.column, []
         for own, value in column.parameters.items():
-            width = FARTHEST * self.tolerance(plan, f"column.{own}")
+            width = FREE * self.tolerance(plan, f"column.{own}")
             moved = [column.parameters | {own: value * (1.0 + share)} for share in (-width, width)]
             if all(specimens.admits(column.model, stiffness=column.stiffness, **one) for one in moved):
                 names.append(f"column.{own}")

@@ -34,7 +34,7 @@ LEAST_PULSE = 8  # ticks: the shape of a shorter pulse is not resolved
 WATCHED = 50
 LEAST_WATCHED, MOST_WATCHED = 2.0, 40.0  # s: bounds of it, for ideal actuators and against long computation
 LOWEST = 0.2  # Hz: at lower frequencies the delay of a transfer system does not change
-FARTHEST = 1e6  # m: a larger motion has diverged
+DIVERGED = 1e6  # m: a larger motion has diverged
 
 
 class TransferPath(NamedTuple):
@@ -115,7 +115,7 @@ def follow(plan: Plan, programme: Programme, role: str = MASTER) -> tuple[Array,
     achieved = np.zeros(target.size)
     for tick in range(target.size - 1):
         _, command = follower(tick, float(achieved[tick]))
-        if not abs(command) <= FARTHEST:
+        if not abs(command) <= DIVERGED:
             return target, achieved[: tick + 1]
         achieved[tick + 1] = step(command)
     return target, achieved

@@ -108,7 +108,7 @@ def which(report: Report) -> list[str]:
     lines: list[str] = []
     if report.status == "not_enough_data":
         return row("which", "not determined")
-    for place, item in enumerate(wording.once(report.which)[:3]):
+    for place, item in enumerate(wording.ranked(report.which)[:3]):
         # the law says what the other parameters mean, and must not be cut off
         order = list(item.parameters)
         found = sorted(wording.parameters(item), key=lambda one: (order.index(one[0]), one[1] != "law"))

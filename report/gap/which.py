@@ -36,7 +36,7 @@ class Card(NamedTuple):
 def candidates(report: Report) -> Sequence[Candidate | Evidence]:
     """The candidates, ranked; those of the verdict where the report has no details."""
     detailed = report.details.candidates
-    return wording.once(detailed) if detailed else wording.once(report.which)
+    return wording.ranked(detailed) if detailed else wording.ranked(report.which)
 
 
 def kinds(report: Report) -> list[tuple[str, str, list[Card]]]:

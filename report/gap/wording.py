@@ -105,12 +105,9 @@ def says(name: str) -> str:
     return entry.says if entry else ""
 
 
-def once(candidates: Sequence[Named]) -> list[Named]:
-    """Candidates, the most probable first; of those with the same effects the most probable one."""
-    found: dict[tuple[str, ...], Named] = {}
-    for item in sorted(candidates, key=lambda item: -(item.probability or 0.0)):
-        found.setdefault(tuple(sorted(item.effects)), item)
-    return list(found.values())
+def ranked(candidates: Sequence[Named]) -> list[Named]:
+    """Candidates, the most probable first."""
+    return sorted(candidates, key=lambda item: -(item.probability or 0.0))
 
 
 def sets(report: Report) -> list[tuple[str, ...]]:
@@ -234,7 +231,7 @@ def place(report: Report) -> str:
 def rivals(report: Report) -> str:
     """The foremost candidates that are about as probable as the first."""
     first = (report.which[0].probability or 0.0) if report.which else 0.0
-    near = [item for item in once(report.which)[:3] if (item.probability or 0.0) >= NEAR * first]
+    near = [item for item in ranked(report.which)[:3] if (item.probability or 0.0) >= NEAR * first]
     names = [effects(item.effects) for item in near]
     if len(names) == 1:
         names.append("another cause")

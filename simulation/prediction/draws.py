@@ -32,7 +32,7 @@ from models.system import System
 
 # Largest relative change of a nominal parameter that is drawn. Tolerances are a few per cent, so that hardly any draw
 # is cut off, and every parameter stays positive.
-FARTHEST = 0.5
+LARGEST_CHANGE = 0.5
 LARGEST = 100.0  # logarithm of a factor beyond which every parameter is at its bound
 
 Moves = Mapping[UncertainParameter, float]
@@ -153,7 +153,7 @@ def with_nominal(plan: Plan, kind: Kind | None, moves: Moves) -> Plan:
     """The plan of one role with the nominal parameters moved; `kind` of its laboratory."""
     system = System(plan)
     for parameter, by in moves.items():
-        factor = 1.0 + float(np.clip(by, -FARTHEST, FARTHEST))
+        factor = 1.0 + float(np.clip(by, -LARGEST_CHANGE, LARGEST_CHANGE))
         if parameter.effect:
             continue
         if parameter.parameter.startswith(f"{BUILDING}."):

@@ -38,7 +38,7 @@ BEYOND = 1.5
 # 72 parameters of laboratories with other formulas 54 lay within them, and 65 within twice as much.
 FOREIGN = 2.0
 HALVINGS = 60  # in which the end of an interval is found, to a part in 10¹⁸ of where it is looked for
-FARTHEST = 12.0  # standard deviations of the widest component within which an end is looked for
+REACH = 12.0  # standard deviations of the widest component within which an end is looked for
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ def mixed(half: float, others: list[tuple[float, float]]) -> tuple[float, float]
     chances /= chances.sum()
 
     def end(share: float) -> float:
-        low, high = shifts.min() - FARTHEST * deviation, shifts.max() + FARTHEST * deviation
+        low, high = shifts.min() - REACH * deviation, shifts.max() + REACH * deviation
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             below = float(chances @ norm.cdf((middle - shifts) / deviation)) < share

@@ -30,7 +30,7 @@ STEPS, ROUNDS = 8, 2  # of such a fit
 TURNS, EVALUATIONS = 2, 60  # of the simplex with the effects' parameters, each followed by a fit of all
 LOGARITHMIC, LINEAR = 0.06, 0.4  # first edges of the simplex, of the logarithm and of a shape over its size
 SURELY = 25.0  # cost by which a law with more free parameters must be better: 5 standard deviations squared
-FARTHEST = 30.0  # times what the best fit leaves: one that leaves more is under no law the right one
+MOST_LEFT = 30.0  # times what the best fit leaves: one that leaves more is under no law the right one
 # Systematic residual over noise below which one law is as good as another: it can hardly be seen.
 SLIGHT = 0.02
 BETTER = 0.9  # of what is left beyond noise: less of it is worth another law than the first
@@ -49,7 +49,7 @@ def in_best_laws(fits: list[Fit], *, modelled: bool = True) -> list[Fit]:
         fits = sorted([fitting.polished(fits[0]), *fits[1:]], key=cost)
         if whole(fits[0]):
             return fits
-    others = raced([item for item in fits if excess(item) <= FARTHEST * excess(fits[0])], modelled=modelled)
+    others = raced([item for item in fits if excess(item) <= MOST_LEFT * excess(fits[0])], modelled=modelled)
     better = ending(sorted((others.get(item.names[-1], item) for item in fits), key=cost), fits)
     return sorted([under_the_first(better[0]), *better[1:]], key=cost)
 
@@ -63,7 +63,7 @@ def as_specimens(bare: Fit, fits: list[Fit]) -> list[Fit]:
     way = path(bare.data.part)
     if way is None or not fits or whole(fits[0]):
         return fits
-    near = {item.names[-1] for item in fits if excess(item) <= FARTHEST * excess(fits[0])}
+    near = {item.names[-1] for item in fits if excess(item) <= MOST_LEFT * excess(fits[0])}
     missing = [one for one in bare.data.part.candidates if models_of(one) and one.name not in near]
     found = [fitted(start, STEPS, ROUNDS) for effect in missing for start in modelled(bare, effect, way)[:1]]
     others = [item for item in fits if item.names[-1] not in {one.names[-1] for one in found}]
@@ -114,7 +114,7 @@ def raced(fits: list[Fit], most: float = math.inf, *, modelled: bool = True) -> 
     """
     firsts = {item.names[-1]: item for item in reversed(fits)}
     starts = [start for item in firsts.values() for start in begun(item, modelled)]
-    most = min(most, FARTHEST * min(map(excess, fits)))
+    most = min(most, MOST_LEFT * min(map(excess, fits)))
     found: dict[str, list[Fit]] = {}
     rough = sorted(each(lambda start: fitted(start, ROUGH, 1), starts), key=cost)
     leading = [item for item in rough[:LEADING] if excess(item) <= most]

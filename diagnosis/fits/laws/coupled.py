@@ -7,7 +7,7 @@ import numpy as np
 from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit, excess
 from diagnosis.fits.hypothesis import Values
-from diagnosis.fits.laws.best import FARTHEST, FITTED, ROUGH, ROUNDS, cost, descended, fitted
+from diagnosis.fits.laws.best import FITTED, MOST_LEFT, ROUGH, ROUNDS, cost, descended, fitted
 from diagnosis.fits.laws.specimen import UNCRACKED, as_specimen, follow, path, within
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import leaves
@@ -68,7 +68,7 @@ def coupled(fit: Fit, first: list[Fit]) -> list[Fit]:
 def moved_on(starts: list[Fit], best: Fit) -> list[Fit]:
     """Fits from starts, each moved on as long as it may still leave no more than the best one known."""
     rough = each(lambda item: fitted(item, ROUGH, 1), starts)
-    hopeful = [item for item in rough if excess(item) <= FARTHEST * excess(best)]
+    hopeful = [item for item in rough if excess(item) <= MOST_LEFT * excess(best)]
     done = each(lambda item: fitted(item, LONG, ROUNDS), hopeful)
     return each(lambda item: descended(item) if fitting.near(item, best) else item, done)
 

@@ -86,14 +86,9 @@ def share(name: str, null: float, least: float, says: str) -> Parameter:
     return Parameter(name, "", null, least, 1.0, (), says, shape=True)
 
 
-def of_layers(name: str, null: float, least: float, most: float, says: str) -> Parameter:
-    """A parameter of shape that only law 11 has."""
-    return Parameter(name, "", null, least, most, (), f"{says}, of law 11", shape=True)
-
-
-def degrading(name: str, null: float, least: float, most: float, says: str) -> Parameter:
-    """A parameter of shape that only law 13 has."""
-    return Parameter(name, "", null, least, most, (), f"{says}, of law 13", shape=True)
+def of_law(law: int, name: str, null: float, least: float, most: float, says: str) -> Parameter:
+    """A parameter of shape that only one of the laws has."""
+    return Parameter(name, "", null, least, most, (), f"{says}, of law {law}", shape=True)
 
 
 EFFECT = sets(
@@ -201,40 +196,53 @@ EFFECT = sets(
             says="strength of laws 5 to 10 on the positive side less that on the negative one, over their sum",
             shape=True,
         ),
-        "concrete": of_layers("concrete", 5.0, 1.0, 30.0, "stiffness of the concrete over that of the bars"),
-        "axial": of_layers("axial", 0.0, 0.0, 5.0, "axial force over that at which all bars yield"),
-        "concrete_strength": of_layers(
+        "concrete": of_law(11, "concrete", 5.0, 1.0, 30.0, "stiffness of the concrete over that of the bars"),
+        "axial": of_law(11, "axial", 0.0, 0.0, 5.0, "axial force over that at which all bars yield"),
+        "concrete_strength": of_law(
+            11,
             "strength",
             0.5,
             0.1,
             3.0,
             "strength of the concrete over its stiffness times the bars' yield strain",
         ),
-        "spalling": of_layers(
+        "spalling": of_law(
+            11,
             "spalling",
             0.0,
             0.0,
             1.0,
             "share of their strength that outer layers lose per strain of yielding bars",
         ),
-        "shaft": of_layers("shaft", 0.6, 0.05, 0.98, "share of the flexibility outside the section"),
-        "focus": of_layers(
-            "focus", 2.0, 0.1, 100.0, "strain in tension over that of yielding bars to which concrete unloads"
+        "shaft": of_law(11, "shaft", 0.6, 0.05, 0.98, "share of the flexibility outside the section"),
+        "focus": of_law(
+            11,
+            "focus",
+            2.0,
+            0.1,
+            100.0,
+            "strain in tension over that of yielding bars to which concrete unloads",
         ),
-        "core": of_layers(
-            "core", 0.1, 0.0, 1.0, "share of the outer layers' loss of strength that the core has"
+        "core": of_law(
+            11, "core", 0.1, 0.0, 1.0, "share of the outer layers' loss of strength that the core has"
         ),
-        "rubbing": of_layers(
-            "friction", 0.0, 0.0, 0.09, "friction of cracks over the first stiffness times yield_displacement"
+        "rubbing": of_law(
+            11,
+            "friction",
+            0.0,
+            0.0,
+            0.09,
+            "friction of cracks over the first stiffness times yield_displacement",
         ),
-        "eccentricity": of_layers(
+        "eccentricity": of_law(
+            11,
             "eccentricity",
             0.0,
             -1.0,
             1.0,
             "constant force over the same, of an axial force off the centre or of a load cell's zero",
         ),
-        "uncracked": of_layers("uncracked", 1.0, 0.3, 5.0, "first stiffness over the planned one"),
+        "uncracked": of_law(11, "uncracked", 1.0, 0.3, 5.0, "first stiffness over the planned one"),
         "yield_loop": Parameter(
             "loop",
             "",
@@ -245,26 +253,31 @@ EFFECT = sets(
             says="width of the loop of laws 12 and 13: 0.5 unloads with the elastic stiffness, 1 with up to twice it",
             shape=True,
         ),
-        "strength_loss": degrading(
-            "strength_loss", 0.0, 0.0, 10.0, "δ_ν, loss of strength per dissipated energy over k·δ_y²"
+        "strength_loss": of_law(
+            13, "strength_loss", 0.0, 0.0, 10.0, "δ_ν, loss of strength per dissipated energy over k·δ_y²"
         ),
-        "stiffness_loss": degrading(
-            "stiffness_loss", 0.0, 0.0, 10.0, "δ_η, loss of stiffness per the same energy"
+        "stiffness_loss": of_law(
+            13, "stiffness_loss", 0.0, 0.0, 10.0, "δ_η, loss of stiffness per the same energy"
         ),
-        "pinch_depth": degrading(
-            "pinch_depth", 0.0, 0.0, 0.99, "ζ_s, share of the slope that pinching takes at last"
+        "pinch_depth": of_law(
+            13, "pinch_depth", 0.0, 0.0, 0.99, "ζ_s, share of the slope that pinching takes at last"
         ),
-        "pinch_place": degrading(
-            "pinch_place", 0.1, -1.0, 1.0, "q, force at which pinching is deepest over the strength"
+        "pinch_place": of_law(
+            13, "pinch_place", 0.1, -1.0, 1.0, "q, force at which pinching is deepest over the strength"
         ),
-        "pinch_rate": degrading(
-            "pinch_rate", 0.1, 0.0, 50.0, "p, rate at which pinching sets in with that energy"
+        "pinch_rate": of_law(
+            13, "pinch_rate", 0.1, 0.0, 50.0, "p, rate at which pinching sets in with that energy"
         ),
-        "pinch_width": degrading(
-            "pinch_width", 0.3, 0.02, 5.0, "ψ, width of pinching over the sum of its depth and pinch_spread"
+        "pinch_width": of_law(
+            13,
+            "pinch_width",
+            0.3,
+            0.02,
+            5.0,
+            "ψ, width of pinching over the sum of its depth and pinch_spread",
         ),
-        "pinch_spread": degrading(
-            "pinch_spread", 0.5, 0.01, 5.0, "λ, added to the depth in the width of pinching"
+        "pinch_spread": of_law(
+            13, "pinch_spread", 0.5, 0.01, 5.0, "λ, added to the depth in the width of pinching"
         ),
     },
     laws=(
