@@ -274,8 +274,11 @@ class System:
         changed = replace(sensors.get(signal, SensorEffects()), **values)
         return replace(self, effects=replace(self.effects, sensors=sensors | {signal: changed}))
 
-    def recorded(self, signal: str, *, delay: float = 0.0, gain: float = 1.0) -> System:
-        """The system of which a logger records one reading, with its sensor's errors, late (s) and times a gain."""
-        own = self.effects.sensors.get(signal, SensorEffects())
-        values = {name: gain * getattr(own, name) for name in ("gain", "bias", "drift", "saturation")}
-        return self.sensed(signal, logger_delay=own.logger_delay + delay, **values)
+    def recorded(self, *signals: str, delay: float = 0.0, gain: float = 1.0) -> System:
+        """The system of which a logger records readings, with their sensors' errors, late (s) and times a gain."""
+        sensors = dict(self.effects.sensors)
+        for signal in signals:
+            own = sensors.get(signal, SensorEffects())
+            values = {name: gain * getattr(own, name) for name in ("gain", "bias", "drift", "saturation")}
+            sensors[signal] = replace(own, logger_delay=own.logger_delay + delay, **values)
+        return replace(self, effects=replace(self.effects, sensors=sensors))

@@ -264,10 +264,11 @@ def later(values: Samples, ticks: float) -> Samples:
         math.prod((-part - other) / (node - other) for other in NODES if other != node) for node in NODES
     ]
     ahead, behind = max(whole, 0) + 2, max(-whole, 0) + 1
-    padded = np.pad(values, (ahead, behind), mode="edge")
-    first = ahead - whole
-    columns = [padded[first + node : first + node + values.size] for node in NODES]
-    return np.asarray(np.tensordot(weights, columns, axes=1))
+    padded = np.concatenate([np.full(ahead, values[0]), values, np.full(behind, values[-1])])
+    first, result = ahead - whole, np.zeros(values.size)
+    for weight, node in zip(weights, NODES, strict=True):
+        result += weight * padded[first + node : first + node + values.size]
+    return result
 
 
 def logged_alone(run: Run) -> bool:

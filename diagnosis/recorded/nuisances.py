@@ -120,9 +120,7 @@ class LoggedReadings(Nuisance):
             values = {"delay": max(self.least, self.about + z * self.tolerance)}
         if values in ({"gain": 1.0}, {"delay": 0.0}):
             return system
-        for name in self.signals:
-            system = system.recorded(name, **values)
-        return system
+        return system.recorded(*self.signals, **values)
 
 
 def nuisances(lab: RecordedLaboratory, names: tuple[str, ...]) -> tuple[Nuisance, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from models.registry import Array
 FORCE, RATE, COMMAND, INTEGRAL = range(4)
 
 
+@lru_cache(maxsize=256)
 def within(length: float, time_constant: float, damping: float) -> Array:
     """Propagation (4, 4) of a motor's force, its rate, its command and the force's integral, over a length (s).
 
@@ -28,7 +30,9 @@ def within(length: float, time_constant: float, damping: float) -> Array:
         omega = 2.0 * damping / time_constant
         rates[FORCE, RATE] = 1.0
         rates[RATE, [FORCE, RATE, COMMAND]] = -(omega**2), -2.0 * damping * omega, omega**2
-    return np.asarray(linalg.expm(rates * length))
+    result = np.asarray(linalg.expm(rates * length))
+    result.flags.writeable = False  # the next caller gets the same one
+    return result
 
 
 def weights(interval: float, time_constant: float, damping: float, places: int) -> Array:
@@ -53,8 +57,17 @@ def states(command: Array, interval: float, time_constant: float, damping: float
         return np.stack([held, np.zeros_like(held), command])
     from scipy import signal
 
+    above, below = transfer(interval, time_constant, damping)
+    force, rate = (signal.lfilter(row, below, command) for row in above)
+    return np.stack([force, rate, command])
+
+
+@lru_cache(maxsize=256)
+def transfer(interval: float, time_constant: float, damping: float) -> tuple[Array, Array]:
+    """Numerators (2, 3) of force and rate from tick to tick over the command, and their denominator (3,)."""
+    from scipy import signal
+
     step = within(interval, time_constant, damping)
     own, driven = step[:COMMAND, :COMMAND], step[:COMMAND, COMMAND:INTEGRAL]
     above, below = signal.ss2tf(own, driven, np.eye(COMMAND), np.zeros((COMMAND, 1)))
-    force, rate = (signal.lfilter(row, below, command) for row in above)
-    return np.stack([force, rate, command])
+    return np.asarray(above), np.asarray(below)
