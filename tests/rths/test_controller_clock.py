@@ -88,6 +88,15 @@ def test_ticks_that_drift_past_a_row_tell_the_way(ppm: float) -> None:
     assert off(found, begin, ppm) < 0.35e-3
 
 
+@pytest.mark.parametrize("ppm", [-55.0, 45.0])
+def test_ticks_that_pass_two_rows_of_twice_the_rate_tell_how_fast_the_clock_is(ppm: float) -> None:
+    times = np.arange(40_000) / 1000.0
+    ticks = np.floor((3e-4 + times / (1.0 + 1e-6 * ppm)) / INTERVAL)
+    found = clock_of(times, [np.sin(3.0 * INTERVAL * ticks)], INTERVAL)
+    assert found is not None
+    assert found.fast == pytest.approx(1e-6 * ppm, abs=6e-6)
+
+
 def test_smooth_and_rounded_and_slow_channels_tell_nothing() -> None:
     times, _, values = logged(1024.0, 0.4e-3, 0.0)
     smooth: Array = np.sin(3.0 * times)
@@ -181,7 +190,22 @@ def test_the_ground_says_which_tick_is_the_first() -> None:
     assert alone is not None
     assert ground is not None
     assert alone.begin == pytest.approx(0.3e-3, abs=2e-5)
-    assert alone.beside(ground).begin == pytest.approx(-1.7e-3, abs=2e-5)
+    both = clock_of(times, [values], INTERVAL, ground)
+    assert both is not None
+    assert both.begin == pytest.approx(-1.7e-3, abs=2e-5)
+
+
+@settings(max_examples=25)
+@given(st.sampled_from([1000.0, 2000.0]), st.floats(0.0, 1.9e-3), st.floats(-60.0, 60.0))
+def test_ticks_that_pass_the_rows_of_twice_the_rate_are_followed_the_way_that_the_ground_says(
+    rate: float, begin: float, ppm: float
+) -> None:
+    times, _, values = logged(rate, begin, ppm)
+    _, _, ground = by_ground(rate, begin, ppm)
+    assert ground is not None
+    found = clock_of(times, [values], INTERVAL, ground)
+    assert found is not None
+    assert off(found, begin, ppm) < 1.0 / rate
 
 
 @pytest.mark.parametrize("first", [0, 2])

@@ -108,26 +108,24 @@ class ControllerClock(NamedTuple):
         following = self.ticks(t) + (1.0 - ON_TICK) * self.interval
         return values[np.clip(np.searchsorted(times, following) - 1, 0, None)]
 
-    def beside(self, other: ControllerClock) -> ControllerClock:
-        """The same clock with that tick as the first one which it is by the other."""
-        turns = round((other.begin - self.begin) / self.interval)
-        return self._replace(begin=self.begin + turns * self.interval)
-
     def places(self, times: Array) -> Array:
         """Times (n,) of the logger, s, in ticks of the controller."""
         return (times - self.begin) / ((1.0 + self.fast) * self.interval)
 
 
-def clock_of(times: Array, channels: Iterable[Array], interval: float) -> ControllerClock | None:
+def clock_of(
+    times: Array, channels: Iterable[Array], interval: float, known: ControllerClock | None = None
+) -> ControllerClock | None:
     """The clock that the channels (n,) at times (n,) of a logger, s, tell; None where none of them holds its values.
 
-    A clock that may be in step is taken to be so: bounds then say no more than between which rows the ticks are.
+    A clock that may be in step is taken to be so: bounds then say no more than between which rows the ticks are. The
+    channels do not say which tick is the first one; a clock that is `known` roughly does.
     """
     ratio = float(np.median(np.diff(times))) / interval if times.size > 1 else 1.0
     if ratio > 1.0 - ROUNDED:
         return None
     for values in sorted(channels, key=lambda one: -np.count_nonzero(np.diff(one))):
-        found = clock_by_changes(times, values, interval)
+        found = clock_by_changes(times, values, interval, known)
         if found is not None and found.holds(times, values):
             return found
     return None
@@ -213,8 +211,13 @@ def refined(clock: ControllerClock, times: Array, ticks: npt.NDArray[np.int_]) -
     return clock
 
 
-def clock_by_changes(times: Array, values: Array, interval: float) -> ControllerClock | None:
-    """The clock by the bounds of one channel (n,); None where they contradict each other."""
+def clock_by_changes(
+    times: Array, values: Array, interval: float, known: ControllerClock | None
+) -> ControllerClock | None:
+    """The clock by the bounds of one channel (n,); None where they contradict each other.
+
+    The bounds are those of any tick. A clock that is `known` roughly says which one is the first.
+    """
     if np.count_nonzero(np.diff(values)) > (1.0 + OTHER) * (times[-1] - times[0]) / interval + 1.0:
         return None  # it changes between ticks
     low, high = bounds(times, values, interval)
@@ -224,8 +227,10 @@ def clock_by_changes(times: Array, values: Array, interval: float) -> Controller
     limits = agreeing(rows, interval)
     if limits is None:
         return None
-    limits[1:] += interval * turns(0.5 * limits[1:].sum(axis=0) / interval)
-    return within(limits, interval)
+    centre = 0.5 * limits[1:].sum(axis=0) / interval
+    begin = float(centre[0]) if known is None else known.begin / interval
+    limits[1:] += interval * turns(centre, begin, passed(times, values, interval, limits[0]))
+    return within(limits, interval, turning=known is None)
 
 
 def agreeing(rows: Sequence[tuple[float, float, float]], interval: float) -> Array | None:
@@ -267,27 +272,42 @@ def bounds(times: Array, values: Array, interval: float) -> tuple[Array, Array]:
 def in_common(low: Array, high: Array, interval: float) -> tuple[float, float, float]:
     """The middle of a block of bounds (runs,), s, and between which times after a multiple of an interval they agree.
 
-    Few of them may be missed.
+    Few of them may be missed. Where ticks pass the rows of a logger of twice the rate, the bounds before and after it
+    are half an interval apart: no time is agreed on, as either may come first.
     """
     middle = 0.5 * (low + high)
     narrow = 1.0 / (high - low)
     turned = np.sum(narrow * np.exp(2j * np.pi * middle / interval))
     about = float(np.angle(turned)) / (2.0 * np.pi) * interval
     off = (middle - about + 0.5 * interval) % interval - 0.5 * interval
+    if np.mean(np.abs(off) > (0.5 - ROUNDED) * interval) > MISSED:
+        return float(np.mean(middle)), math.inf, -math.inf
     half = 0.5 * (high - low)
     least, most = np.quantile(off - half, 1.0 - MISSED), np.quantile(off + half, MISSED)
     return float(np.mean(middle)), about + float(least), about + float(most)
 
 
-def turns(centre: Array) -> Array:
-    """Whole intervals (blocks,) that join limits about `centre` (blocks,), in intervals, to a steady course.
+def passed(times: Array, values: Array, interval: float, until: Array) -> Array:
+    """How many ticks passed a row of a logger of twice the rate, until each of some times (blocks,), s, from the last.
 
-    Where one may go on either side by as much, it goes to where ticks are nearer to the first row.
+    One that passes a row towards later ones leaves a value in three rows in place of two, and counts one; one that
+    passes a row towards earlier ones leaves a value in one row, and counts minus one.
     """
-    result = np.zeros(centre.size)
-    last = float(centre[0])
+    new = np.flatnonzero(np.diff(values)) + 1
+    apart = np.diff(times[new]) / interval
+    way = (np.abs(apart - 1.5) < ROUNDED).astype(float) - (np.abs(apart - 0.5) < ROUNDED)
+    return np.histogram(times[new[1:]], np.concatenate([[-math.inf], until]), weights=way)[0]
+
+
+def turns(centre: Array, begin: float, ways: Array) -> Array:
+    """Whole intervals (blocks,) that join limits about `centre` (blocks,), in intervals, to a course from `begin` on.
+
+    Where a limit may go on either side by as much, it goes the way (blocks,) that the ticks go, or else to where they
+    are nearer to the first row.
+    """
+    result, last = np.zeros(centre.size), begin
     for place, here in enumerate(centre):
-        result[place] = round(last - math.copysign(TOWARDS, last) - here)
+        result[place] = round(last + math.copysign(TOWARDS, ways[place] or -last) - here)
         last = float(here + result[place])
     return result
 

@@ -172,10 +172,8 @@ def clock_in(
         return clock_by_rows(theirs[own], interval, there, planned), planned
     if ground is not None and planned is not None and np.isfinite(ground).all():
         by_ground = clock_by_ground(theirs, ground, planned, interval)
-    found = clock_of(theirs, columns_of(mapping, table, data, rows), interval)
-    if by_ground is None:
-        return found, None
-    return (found.beside(by_ground) if found else by_ground), planned
+    found = clock_of(theirs, columns_of(mapping, table, data, rows), interval, by_ground)
+    return found or by_ground, None if by_ground is None else planned
 
 
 def recorded_ground(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> Array | None:
