@@ -34,7 +34,7 @@ from diagnosis.recorded.record import Late, Record
 from diagnosis.signals import pieces
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
-from laboratories.kind import Machine
+from laboratories.kind import Follows, Machine
 from laboratories.kinds import KINDS
 from loop import replay
 from models.registry import Array
@@ -99,6 +99,16 @@ def with_fields(part: Any, fields: dict[str, Any]) -> Any:
     for name, value in ({"played": (), "curved": None, "misses": {}} | fields).items():
         setattr(result, name, value)
     return result
+
+
+def drift(record: Record, lab: RecordedLaboratory) -> Array | None:
+    """The drift of the building (ticks,) that a laboratory follows, as its target, m; None where none was recorded."""
+    coupling = lab.kind.coupling(lab.plan)
+    if coupling.follows is not Follows.DRIFT or not record.has("displacement"):
+        return None
+    floors = record.signals["displacement"].reshape(record.ticks, -1)
+    below = floors[:, coupling.place - 2] if coupling.place > 1 else 0.0
+    return np.asarray(coupling.ratio * (floors[:, coupling.place - 1] - below))
 
 
 def outputs(record: Record, names: tuple[str, ...]) -> tuple[Array, Mask]:
@@ -184,12 +194,14 @@ class LaboratoryPart:
     def targets(self, record: Record) -> dict[str, Array]:
         """What moves the laboratory, by command, without the noise of its sensors that a controller feeds back.
 
-        It is the target in the place of the transfer system's command. Where no target was recorded that command is
-        left out: the readings predicted from it hold its motion, and its noise behind the lag of the machine only.
+        It is the target in the place of the transfer system's command, or the drift of the building that is its target.
+        Where neither was recorded that command is left out: the readings predicted from it hold its motion, and its
+        noise behind the lag of the machine only. Behind a filter of a logger that noise comes before that of readings.
         """
         channels = self.lab.kind.channels
         command, target = self.lab.signal(channels.command.name), self.lab.signal(channels.target.name)
-        known = {command: record.signals[target]} if record.has(target) else {}
+        wanted = record.signals[target] if record.has(target) else drift(record, self.lab)
+        known = {} if wanted is None else {command: wanted}
         return {
             name: known.get(name, values)
             for name, values in self.inputs.items()
