@@ -17,7 +17,7 @@ from common.terminal.telling import Tell, untold
 from diagnosis.findings import report, where
 from diagnosis.findings.certainty.other_causes import small
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.logged import building, filters, logger, means, start
+from diagnosis.findings.logged import building, delays, filters, logger, means, start
 from diagnosis.findings.sensors import jumps, outliers, readings, staircases, swaying, uneven_noise
 from diagnosis.findings.sensors.loud_noise import no_noise
 from diagnosis.findings.sensors.noise_levels import highest_rms, lines_rms, noise_rms
@@ -90,7 +90,7 @@ def diagnose(
 
 def put_right(record: Record) -> Record:
     """A record on the clock of its commands, with what its logger did to its readings and its map does not state."""
-    return start.begun(means.averaged(filters.filtered(logger.clocked(logger.whole(record)))))
+    return start.begun(means.averaged(delays.delayed(filters.filtered(logger.clocked(logger.whole(record))))))
 
 
 def among(record: Record, systems: Mapping[str, System]) -> Record:
@@ -341,6 +341,11 @@ def not_recorded(record: Record) -> list[str]:
             result.append(f"{command} was not recorded, so the actuator cannot be judged.")
     if record.run.has("master") and record.run.has("slave") and not exchange_known(record.run):
         result.append("The recording holds no message numbers or time stamps, so the link cannot be judged.")
+    if record.worked_out:
+        result.append(
+            f"Not recorded: {', '.join(record.worked_out)}, which is worked out from the plan's control. Record it to "
+            "have the control judged apart from the laboratory."
+        )
     unused = [name for name in used(record) if not record.has(name)]
     if record.has(*BUILDING) and unused and not record.plan.foreign:
         result.append(f"The building cannot be judged without {' and '.join(unused)}.")

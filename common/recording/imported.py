@@ -187,6 +187,12 @@ class ImportedData:
         one = replace(said, delay=delay, average=length)
         return replace(self, channels={**self.channels, topic: {**self.channels.get(topic, {}), name: one}})
 
+    def with_delay(self, topic: str, name: str, delay: float) -> ImportedData:
+        """The same with a signal's channel that is later by some s."""
+        said = self.channel(topic, name)
+        rows = {**self.channels.get(topic, {}), name: replace(said, delay=said.delay + delay)}
+        return replace(self, channels={**self.channels, topic: rows})
+
     def metadata(self) -> dict[str, str]:
         """The values of the metadata record."""
         tables = {

@@ -20,6 +20,7 @@ from common.recording.run import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING
 from common.signals import alike
+from diagnosis.recorded.commands import at_targets, completed
 from diagnosis.recorded.laboratory import RecordedLaboratory, recorded
 from diagnosis.signals import clock
 from diagnosis.signals.mask import Mask
@@ -27,7 +28,7 @@ from diagnosis.signals.noise import quantum
 from laboratories import effects
 from laboratories.effects.effect import Effect
 from laboratories.effects.sites import BUILDING, LINK, sensors
-from laboratories.kinds import KINDS, kind_of
+from laboratories.kinds import kind_of
 from loop import substructure
 from models.registry import Array
 from models.system import System
@@ -106,6 +107,9 @@ class Record:
     passed: Mapping[tuple[str, str], LoggerFilter] = field(default_factory=dict)
     # s, of channels whose samples are means over as long, which the map does not state, by topic and name
     averaged: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    # s, by which channels are late beside filters that the map states, by topic and name
+    delayed: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    worked_out: tuple[str, ...] = ()  # commands that were not recorded and follow from what was
 
     @cached_property
     def mapped(self) -> ImportedData | None:
@@ -114,12 +118,14 @@ class Record:
 
     @cached_property
     def stated(self) -> ImportedData | None:
-        """The properties of the logger's channels that the import map states, with the filters that were found."""
+        """The properties of the logger's channels that the import map states, with what was found of its filters."""
         said = self.mapped
         for (topic, name), one in self.passed.items():
             said = said and said.with_filter(topic, name, one)
         for (topic, name), length in self.averaged.items():
             said = said and said.with_average(topic, name, length)
+        for (topic, name), delay in self.delayed.items():
+            said = said and said.with_delay(topic, name, delay)
         return said
 
     @property
@@ -281,14 +287,17 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
     labs = recorded(every, plans)
     signals, present = on_ticks(run, topics, without_rows(run, chosen.test.interval, ticks), labs)
     if against_ideal:
-        commanded(signals, present, labs)
+        at_targets(signals, present, labs)
+    worked_out = completed(signals, present, labs, chosen.test.interval)
     known = plan is None or (own is not None and own.ground_motion == plan.ground_motion)
     ground = believed_ground(run, chosen, ticks, known)
     around = None
     if every.slaves and whole.has(MASTER):
         around = WholeTest(every, role, used_forces(whole, every, ticks))
     held = first.begun * chosen.test.interval if first is not None else None
-    return Record(chosen, run, ticks, signals, present, ground, other, around, plans, labs, held)
+    return Record(
+        chosen, run, ticks, signals, present, ground, other, around, plans, labs, held, worked_out=worked_out
+    )
 
 
 def is_static(run: Run) -> bool:
@@ -344,19 +353,6 @@ def without_rows(run: Run, interval: float, ticks: int) -> Mask:
     return result
 
 
-def commanded(
-    signals: dict[str, Array], present: dict[str, Mask], labs: tuple[RecordedLaboratory, ...]
-) -> None:
-    """Put the targets in place of the commands of transfer systems that a plan says to be ideal."""
-    for lab in labs:
-        channels = lab.kind.channels
-        command, target = lab.signal(channels.command.name), lab.signal(channels.target.name)
-        if target in signals and lab.kind.name in KINDS:
-            signals[command], present[command] = wanted(
-                signals[target], present[target], at_end=lab.role != MASTER
-            )
-
-
 def check_slaves(run: Run, plan: Plan) -> None:
     """Raise InputError where the recording's slaves are not those of the plan."""
     if run.roles != plan.roles:
@@ -364,16 +360,6 @@ def check_slaves(run: Run, plan: Plan) -> None:
             f"{run.path} is of the {' and the '.join(map(title, run.roles or [MASTER]))}, but the plan is of the "
             f"{' and the '.join(map(title, plan.roles or [MASTER]))}: give the plan of that test with --plan."
         )
-
-
-def wanted(values: Array, there: Mask, *, at_end: bool) -> tuple[Array, Mask]:
-    """A target as the command of an ideal transfer system, which is the target at the end of the interval.
-
-    A target that is sent to a slave is already that of the interval's end; the master's own is recorded for the tick.
-    """
-    if at_end:
-        return values, there
-    return np.append(values[1:], values[-1]), np.append(there[1:], there[-1])
 
 
 def laid_out(values: Array, places: NDArray[np.int64], ticks: int) -> tuple[Array, Mask]:

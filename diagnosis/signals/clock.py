@@ -16,6 +16,8 @@ from models.registry import Array
 
 BLOCKS = 12  # of a recording, by which the error of a rate is told
 SURE, ALONE = 6.0, 4.0  # standard errors of a common rate, and of the rate that each laboratory says
+# The same of a rate that quartzes err by as a rule, which needs less to be believed, and the largest such rate.
+USUALLY_SURE, USUALLY_ALONE, QUARTZ = 4.0, 2.0, 6e-5
 MOST = 1e-3  # of a rate: a quartz errs by less than a tenth of it
 TAPS = 16  # samples on each side of an interpolation
 KAISER = 8.0  # shape of its window: errors below 1e-4 up to three quarters of the highest frequency
@@ -67,8 +69,10 @@ def common(laboratories: Sequence[Sequence[Rate]]) -> float:
     said = [together(rates) for rates in known]
     every = [one for rates in known for one in rates]
     found = together(every)
-    sure = abs(found.fast) > SURE * found.error and abs(found.fast) < MOST
-    alone = all(one.fast * found.fast > 0.0 and abs(one.fast) > ALONE * one.error for one in said)
+    usual = abs(found.fast) < QUARTZ
+    least, least_alone = (USUALLY_SURE, USUALLY_ALONE) if usual else (SURE, ALONE)
+    sure = abs(found.fast) > least * found.error and abs(found.fast) < MOST
+    alone = all(one.fast * found.fast > 0.0 and abs(one.fast) > least_alone * one.error for one in said)
     agree = all(abs(one.fast - found.fast) < ALONE * np.hypot(one.error, found.error) for one in every)
     return found.fast if sure and alone and agree else 0.0
 

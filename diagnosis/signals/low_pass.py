@@ -221,6 +221,14 @@ def likeliest(late: float, beyond: float, *of: ReadSpectra) -> ImportedChannel:
     return best[0] if best[1] < alone[1] - beyond else alone[0]
 
 
+def delay(of: ReadSpectra) -> ImportedChannel:
+    """The delay alone behind which readings are least surprising."""
+    said, alone = partial(surprise, of), shape("", 0)
+    place = min(range(len(LATES)), key=lambda place: said(alone(LATES[place])))
+    low, high = LATES[max(0, place - 1)], LATES[min(place + 1, len(LATES) - 1)]
+    return closest(said, alone, low, high)[0]
+
+
 def closest(
     said: Callable[[ImportedChannel], float], of: Shape, low: float, high: float
 ) -> tuple[ImportedChannel, float]:

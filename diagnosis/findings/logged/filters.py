@@ -151,7 +151,7 @@ def before_time(labs: Sequence[AlikeReadings], most: float) -> float:
     """By how much readings of several laboratories are early alike, s, `most` at most; 0 where they are not.
 
     The laboratory decides that knows it best, unless it is less likely in one that is early less: a fault may make
-    readings earlier still.
+    readings earlier still. Where only one knows it, all others must be likelier with it than without.
     """
     found = [
         (low_pass.closest(partial(low_pass.surprise, one.spectra), earlier, 0.0, most)[0], one)
@@ -160,7 +160,9 @@ def before_time(labs: Sequence[AlikeReadings], most: float) -> float:
     sure = [
         LikelyFilter(channel, gain, one) for channel, one in found if (gain := one.gain(channel)) > BEYOND
     ]
-    if len(sure) < 2:
+    if not sure or len(found) < 2:
+        return 0.0
+    if len(sure) == 1 and any(one.gain(sure[0].channel) <= 0.0 for one in labs):
         return 0.0
     chosen = next(
         one

@@ -11,7 +11,7 @@ import numpy as np
 from common.recording.imported import ImportedChannel, LoggerFilter
 from diagnosis.findings.certainty.intervals import FOREIGN, covariance
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.logged import means
+from diagnosis.findings.logged import delays, means
 from diagnosis.findings.sensors import readings
 from diagnosis.findings.verdict import UNNAMED, PartVerdict
 from diagnosis.fits import fitting, hypothesis, residuals
@@ -127,7 +127,14 @@ def rates(lab: LaboratoryPart, fit: Fit) -> list[clock.Rate]:
 
 def remarks(found: Diagnosis) -> list[str]:
     """Sentences on what the logger of an import did to readings: filters, delays, a fast or slow clock, gains."""
-    return [*passed(found), *means.remarks(found), *timed(found), *gained(found), *bent(found)]
+    return [
+        *passed(found),
+        *means.remarks(found),
+        *delays.remarks(found),
+        *timed(found),
+        *gained(found),
+        *bent(found),
+    ]
 
 
 def bent(found: Diagnosis) -> list[str]:
