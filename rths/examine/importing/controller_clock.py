@@ -54,6 +54,11 @@ class ControllerClock(NamedTuple):
         return self.begin != 0.0 or self.fast != 0.0
 
     @property
+    def slack(self) -> float:
+        """Of an interval, within which a row is on its tick; none where rows drift past the ticks."""
+        return 0.0 if self.between else ON_TICK
+
+    @property
     def told(self) -> str:
         """A sentence for the user."""
         side = "before" if self.begin < 0.0 else "after"
@@ -96,17 +101,24 @@ class ControllerClock(NamedTuple):
 
     def seen(self, times: Array, values: Array) -> tuple[Array, Array]:
         """The ticks (m,), s by the controller, whose values (m,) were in force at times (n,) of the logger, s."""
-        on_tick, places = 0.0 if self.between else ON_TICK, self.places(times)
+        places = self.places(times)
         at_ticks = bool(np.all(np.abs(places - np.rint(places)) < ROUNDED))
         ticks, rows = np.unique(
-            np.rint(places) if at_ticks else np.floor(places + on_tick), return_index=True
+            np.rint(places) if at_ticks else np.floor(places + self.slack), return_index=True
         )
         return self.interval * ticks, values[rows]
 
     def latest(self, times: Array, values: Array, t: Array) -> Array:
-        """What was recorded last, of values (n,) at times (n,) of the logger, s, before the tick after each at `t`."""
-        following = self.ticks(t) + (1.0 - ON_TICK) * self.interval
-        return values[np.clip(np.searchsorted(times, following) - 1, 0, None)]
+        """What was recorded last, of values (n,) at times (n,) of the logger, s, before the tick after each at `t`.
+
+        They are numbers that count. A tick without a row of its own, which a logger that is slow by little passes over
+        now and then, has the number between those around it.
+        """
+        following = self.ticks(t + (1.0 - self.slack) * self.interval)
+        rows = np.clip(np.searchsorted(times, following) - 1, 0, None)
+        result, after = values[rows], values[np.clip(rows + 1, None, values.size - 1)]
+        passed = np.append(False, np.diff(rows) == 0) & (after == result + 2)
+        return np.where(passed, result + 1, result)
 
     def places(self, times: Array) -> Array:
         """Times (n,) of the logger, s, in ticks of the controller."""
@@ -155,10 +167,13 @@ def clock_by_rows(
     return ControllerClock(interval, float(begin - first * apart), fast)
 
 
-def clock_by_ground(times: Array, values: Array, ground: Array, interval: float) -> ControllerClock | None:
+def clock_by_ground(
+    times: Array, values: Array, ground: Array, interval: float, channels: Iterable[Array] = ()
+) -> ControllerClock | None:
     """The clock by recorded ground acceleration (n,) at times (n,) of a logger, s, and the plan's (ticks,).
 
-    None where what was recorded is no number of the controller, held from tick to tick.
+    What `channels` (n,) hold says more of it, where they move longer than the ground. None where what was recorded is
+    no number of the controller, held from tick to tick.
     """
     same, tick = in_force(times, values, ground, interval)
     if same is None:
@@ -172,6 +187,7 @@ def clock_by_ground(times: Array, values: Array, ground: Array, interval: float)
     ]
     limits = agreeing(rows, interval)
     found = None if limits is None else within(limits, interval, turning=False)
+    found = (found and clock_of(times, channels, interval, found)) or found
     return refined(found, when, ticks) if found and found.between else found
 
 

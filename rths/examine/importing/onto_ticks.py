@@ -164,16 +164,18 @@ def clock_in(
     None where nothing tells it.
     """
     interval = mapping.plan.test.interval
-    by_ground = planned = None
+    planned = None
     if (ground := recorded_ground(mapping, table, data, rows)) is not None:
         planned = planned_ground(mapping.plan, float(theirs[-1]))
     if (own := rows_of_controller(mapping, table, data, rows)) is not None:
         there = None if ground is None or np.isnan(ground[own]).any() else ground[own]
         return clock_by_rows(theirs[own], interval, there, planned), planned
+    channels = columns_of(mapping, table, data, rows)
     if ground is not None and planned is not None and np.isfinite(ground).all():
-        by_ground = clock_by_ground(theirs, ground, planned, interval)
-    found = clock_of(theirs, columns_of(mapping, table, data, rows), interval, by_ground)
-    return found or by_ground, None if by_ground is None else planned
+        found = clock_by_ground(theirs, ground, planned, interval, channels)
+        if found is not None:
+            return found, planned
+    return clock_of(theirs, channels, interval), None
 
 
 def recorded_ground(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> Array | None:
