@@ -154,6 +154,17 @@ class Symmetric:
         return float(self.delays[direction][seq])
 
 
+def test_without_time_stamps_few_messages_that_were_lost_in_bursts_are_found() -> None:
+    link = ImpairedLink(loss=0.002, burst=3.0, seed=8)
+    (found,) = findings(account(recorded(link, stamps=False), DT), DT)
+    assert found.effect == "link.loss"
+    probability, burst = found.parameters["probability"], found.parameters["burst"]
+    assert probability[1][0] <= 0.002 <= probability[1][1]
+    assert burst[1][0] <= 3.0 <= burst[1][1]
+    single = ImpairedLink(loss=0.002, burst=1.0, seed=8)
+    assert findings(account(recorded(single, stamps=False), DT), DT) == []
+
+
 def test_the_constant_delay_of_a_symmetric_scatter_is_its_mean() -> None:
     found = values(recorded(Symmetric()))
     assert found["delay"][0] == pytest.approx(0.008, rel=0.02)

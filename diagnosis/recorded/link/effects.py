@@ -23,6 +23,7 @@ from models.registry import Array
 LEAST_LOST = 3  # messages on a real clock: one or two may be lost when a process starts or ends
 # Of messages lost where there are no time stamps, by which a late message looks like a lost one.
 LEAST_SHARE = 0.005
+LEAST_RUNS = 3  # of two and more messages without a successor in time, from which on fewer are taken for lost as well
 LEAST_OFF = 0.001  # share of messages off the usual age, without time stamps, from which on delays scatter
 REAL = 0.1  # of an interval: scatter and delay of which a real clock's time stamps are certain
 QUICK = 0.25  # of an interval, most of the clocks' error that is taken away from a delay: a fast network's own delay
@@ -135,7 +136,8 @@ def lossy(found: LinkAccount) -> LinkFinding | None:
     tried = sum(item.tried.size for item in found.directions)
     lost = sum(int(item.lost.sum()) for item in found.directions)
     least = 1 if found.virtual else LEAST_LOST
-    if lost < least or (not found.stamped and lost < LEAST_SHARE * tried):
+    several = sum(map(runs_of_several, found.directions)) >= LEAST_RUNS
+    if lost < least or (not found.stamped and lost < LEAST_SHARE * tried and not several):
         return None
     followed, ended = np.sum([runs(item) for item in found.directions], axis=0)
     share, leave = lost / tried, max(ended, 0.5) / followed if followed else 1.0
@@ -153,6 +155,12 @@ def lossy(found: LinkAccount) -> LinkFinding | None:
     }
     text = f"{lost} of {tried} messages never arrived"
     return LinkFinding("link.loss", values, text, certainty(math.sqrt(lost * heavy), 1.0))
+
+
+def runs_of_several(item: Direction) -> int:
+    """Number of runs of two and more lost messages; late ones come one by one."""
+    pairs = item.lost[:-1] & item.lost[1:] & (np.diff(item.tried) == 1)
+    return int(np.sum(pairs & ~np.append(False, pairs)[:-1]))
 
 
 def runs(item: Direction) -> tuple[int, int]:
