@@ -1,4 +1,4 @@
-"""Commands of laboratories that a recording lacks, or that a plan says to be reached at once."""
+"""Commands of laboratories that a recording lacks, or has as they were sent, or that a plan says to be reached at once."""
 
 from __future__ import annotations
 
@@ -17,6 +17,10 @@ from models.registry import Array
 # Ticks and degree of the polynomials whose slope is a velocity: of 10 Hz they take 0.1 % away at 2 ms, and of steps of
 # 1 µm in the displacement 0.02 mm/s are left.
 SMOOTHED, DEGREE = 9, 4
+LATEST = 25  # ticks by which messages are late at most, where it is looked for
+# Of what a command differs by from the target of its tick, and of its rms, what it differs by at most from the target
+# that was received, where the log has the target as it was sent.
+NEARER, NEAR = 0.2, 1e-3
 
 Number = TypeVar("Number", np.float64, np.bool_)
 
@@ -40,6 +44,28 @@ def wanted(values: Array, there: Mask, *, at_end: bool) -> tuple[Array, Mask]:
     A target that is sent to a slave is already that of the interval's end; the master's own is recorded for the tick.
     """
     return (values, there) if at_end else (following(values), following(there))
+
+
+def received(signals: dict[str, Array], labs: tuple[RecordedLaboratory, ...]) -> None:
+    """Put what slaves received in the place of what a log has as it was sent.
+
+    Without a compensator a slave's command is the target that it received. Where it is the target of an earlier tick,
+    the log has the master's own numbers, of which the others are on their way as long.
+    """
+    for lab in labs:
+        channels = lab.kind.channels
+        command, *sent = (lab.signal(one.name) for one in (channels.command, *channels.driving))
+        if lab.role == MASTER or not {command, sent[0]} <= signals.keys():
+            continue
+        reached, target = signals[command], signals[sent[0]]
+        used = in_force(signals, lab, target.size)
+        if lab.kind.compensator(lab.plan).kind != "none" or not np.ptp(target):
+            continue
+        ways = [np.clip(used - late, 0, None) for late in range(LATEST + 1)]
+        missed = [float(np.std(reached - target[way])) for way in ways]
+        best = int(np.argmin(missed))
+        if missed[best] < min(NEARER * np.std(reached - target), NEAR * np.std(reached)):
+            signals |= {name: signals[name][ways[best]] for name in sent if name in signals}
 
 
 def completed(

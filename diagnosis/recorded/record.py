@@ -20,7 +20,7 @@ from common.recording.run import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING
 from common.signals import alike
-from diagnosis.recorded.commands import at_targets, completed
+from diagnosis.recorded.commands import at_targets, completed, received
 from diagnosis.recorded.laboratory import RecordedLaboratory, recorded
 from diagnosis.signals import clock
 from diagnosis.signals.mask import Mask
@@ -288,6 +288,8 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
     signals, present = on_ticks(run, topics, without_rows(run, chosen.test.interval, ticks), labs)
     if against_ideal:
         at_targets(signals, present, labs)
+    if imported(run) is not None:
+        received(signals, labs)
     worked_out = completed(signals, present, labs, chosen.test.interval)
     known = plan is None or (own is not None and own.ground_motion == plan.ground_motion)
     ground = believed_ground(run, chosen, ticks, known)

@@ -23,7 +23,9 @@ from models.registry import Array
 LEAST_LOST = 3  # messages on a real clock: one or two may be lost when a process starts or ends
 # Of messages lost where there are no time stamps, by which a late message looks like a lost one.
 LEAST_SHARE = 0.005
-LEAST_RUNS = 3  # of two and more messages without a successor in time, from which on fewer are taken for lost as well
+LEAST_RUNS = (
+    3  # of two and more messages without a successor in time, from which on fewer are taken for lost as well
+)
 LEAST_OFF = 0.001  # share of messages off the usual age, without time stamps, from which on delays scatter
 REAL = 0.1  # of an interval: scatter and delay of which a real clock's time stamps are certain
 QUICK = 0.25  # of an interval, most of the clocks' error that is taken away from a delay: a fast network's own delay
