@@ -1,4 +1,4 @@
-"""Commands of laboratories that a recording lacks, or has as they were sent, or that a plan says to be reached at once."""
+"""Commands that a recording lacks, or has as they were sent, or that a plan says to be reached at once."""
 
 from __future__ import annotations
 

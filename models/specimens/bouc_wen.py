@@ -9,8 +9,8 @@ with A = 1 and z made dimensionless by the yield displacement. The bound is
 The equation is autonomous in δ while δ moves one way, so it is integrated over the increment itself, by
 the classic Runge-Kutta method of order 4 in substeps short against the equation's steepest slope. Its
 right-hand side has a kink at z = 0 for odd and broken n; a substep that would cross it ends there instead.
-Close to the bound z_u the distance e = 1 − z/z_u follows `de/dδ = −n·e·(1 − (n − 1)·e/2)/(z_u·δ_y)`, to which Bernoulli's
-solution is known, so an increment of any size takes a bounded time.
+Close to the bound z_u the distance e = 1 − z/z_u follows Bernoulli's equation,
+`de/dδ = −n·e·(1 − (n − 1)·e/2)/(z_u·δ_y)`, whose solution is known: an increment of any size takes a bounded time.
 
 Not to be confused with Bouc-Wen-Baber-Noori, which degrades and pinches; nor with the other convention
 in which β and γ carry units of m⁻ⁿ.

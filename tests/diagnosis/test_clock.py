@@ -73,6 +73,14 @@ def test_rates_that_agree_but_for_a_model_that_errs_tell_one() -> None:
     assert clock.common([warming, damper]) == 0.0
 
 
+def test_a_rate_that_quartzes_err_by_needs_less_to_be_believed() -> None:
+    usual, rare = (([clock.Rate(fast, 5e-6)], [clock.Rate(fast, 12e-6)]) for fast in (30e-6, 200e-6))
+    assert clock.common(usual) == pytest.approx(30e-6)
+    assert clock.common(rare) == pytest.approx(200e-6)
+    assert clock.common([usual[0], [clock.Rate(15e-6, 12e-6)]]) == 0.0
+    assert clock.common([rare[0], [clock.Rate(200e-6, 80e-6)]]) == 0.0
+
+
 def test_a_reading_is_put_onto_the_clock_of_the_ticks() -> None:
     found = clock.put_right(motion(TIME * (1.0 + FAST)), FAST, stepped=False)
     inner = slice(clock.TAPS, -clock.TAPS)

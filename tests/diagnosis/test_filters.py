@@ -154,6 +154,19 @@ def test_readings_together_decide_on_one_delay(sure: float, said: float) -> None
     assert [one.channel.delay for one in found] == pytest.approx([said * LATE] * 2)
 
 
+@pytest.mark.parametrize(("other", "early"), [(-0.6, True), (-2.0, True), (-0.3, False), (1.0, False)])
+def test_one_laboratory_tells_that_all_are_early_where_the_others_are_likelier_so(
+    other: float, early: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def surprise(of: Wanted, channel: ImportedChannel) -> float:
+        return of.sure * ((channel.delay / LATE - of.late) / of.late) ** 2
+
+    monkeypatch.setattr(low_pass, "surprise", surprise)
+    found = filters.before_time(readings(Wanted(-1.0, 300.0), Wanted(other, 5.0)), 2.0 * LATE)
+    assert found == pytest.approx(LATE if early else 0.0, rel=0.1)
+    assert filters.before_time(readings(Wanted(-1.0, 300.0)), 2.0 * LATE) == 0.0
+
+
 @pytest.mark.usefixtures("weighed")
 @pytest.mark.parametrize(("other", "agreed"), [(1.04, True), (1.4, False)])
 def test_one_delay_of_all_is_taken_where_none_loses_by_it(other: float, agreed: bool) -> None:

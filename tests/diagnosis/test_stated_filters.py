@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from scipy import signal
 from common.recording.imported import IMPORT, ImportedChannel, LoggerFilter
 from common.roles import MASTER
 from diagnosis.diagnose import diagnose
-from diagnosis.findings.logged import logger
+from diagnosis.findings.logged import delays, logger
 from diagnosis.fits import residuals
 from diagnosis.fits.fitting import fit
 from diagnosis.fits.scales import Scales
@@ -131,3 +131,28 @@ def test_a_motion_that_diverges_passes_no_logger(cases: Cases) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert through_logger(readings, lab, whole.systems[lab.role], stated, []) is readings
+
+
+def later(whole: Record, names: Collection[str], ticks: int = 2) -> Record:
+    """The record with readings that come some ticks later."""
+    read = {name: whole.signals[name] for name in names}
+    late = {name: np.append([values[0]] * ticks, values[:-ticks]) for name, values in read.items()}
+    return replace(whole, signals=whole.signals | late)
+
+
+def test_forces_that_come_later_than_behind_a_stated_filter_are_the_loggers(cases: Cases) -> None:
+    whole = behind(cases.record(), BUTTERWORTH, lambda x: BUTTERWORTH.filtered(x, 1.0 / RATE))
+    names = ("column_force", "damper_force")
+    assert delays.delayed(whole).delayed == {}
+    found = delays.delayed(later(whole, names)).delayed
+    assert {name for _, name in found} == set(names)
+    assert list(found.values()) == pytest.approx([0.004] * 2, rel=0.1)
+    assert delays.delayed(later(whole, names[1:])).delayed == {}
+    stated = logged(cases.record(), {"filter": asdict(BUTTERWORTH), "delay": 0.001}, lambda x: x)
+    assert delays.delayed(later(stated, names)).delayed == {}
+
+
+def test_a_delay_that_one_laboratory_has_is_not_the_loggers(cases: Cases) -> None:
+    whole = cases.record({"actuator.delay": {"delay": 0.004}})
+    passed = behind(whole, BUTTERWORTH, lambda x: BUTTERWORTH.filtered(x, 1.0 / RATE))
+    assert delays.delayed(passed).delayed == {}

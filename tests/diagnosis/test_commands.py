@@ -1,0 +1,84 @@
+"""Commands that a log leaves out, or has as the master sent them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.recorded import commands
+from diagnosis.recorded.record import Record
+from diagnosis.signals.mask import Mask
+from models.registry import Array
+from tests.diagnosis.cases import Cases, lab_a
+
+EFFORT, COMMAND, TARGET = "damper_command", "table_command", "table_target"
+
+
+def without(whole: Record, *names: str) -> tuple[dict[str, Array], dict[str, Mask]]:
+    """The signals of a record and where they are present, without some."""
+    kept = whole.signals.keys() - set(names)
+    return {name: whole.signals[name] for name in kept}, {name: whole.present[name] for name in kept}
+
+
+@pytest.mark.parametrize("left_out", [("velocity",), ()])
+def test_the_commands_that_a_log_leaves_out_are_those_of_the_plans_control(
+    left_out: tuple[str, ...], cases: Cases
+) -> None:
+    whole = cases.record()
+    signals, present = without(whole, EFFORT, COMMAND, *left_out)
+    assert commands.completed(signals, present, whole.labs, 0.002) == (EFFORT, COMMAND)
+    assert np.array_equal(signals[COMMAND], whole.signals[COMMAND])
+    true = whole.signals[EFFORT]
+    assert np.std(signals[EFFORT] - true) < 1e-3 * np.std(true)
+    assert present[EFFORT].all()
+
+
+def test_a_command_is_on_its_way_as_long_as_the_numbers_of_messages_say(cases: Cases) -> None:
+    whole = cases.record()
+    signals, present = without(whole, EFFORT)
+    numbers: Array = 7000.0 + np.arange(whole.ticks, dtype=np.float64)
+    numbers[500:503] = numbers[499]
+    signals["command_seq"] = numbers
+    commands.completed(signals, present, whole.labs, 0.002)
+    assert np.array_equal(signals[EFFORT][500:503], [signals[EFFORT][499]] * 3)
+    assert signals[EFFORT][503] == pytest.approx(whole.signals[EFFORT][503], rel=1e-2)
+
+
+def test_nothing_is_worked_out_of_what_was_recorded_or_cannot_be_known(cases: Cases) -> None:
+    whole = cases.record()
+    signals, present = without(whole)
+    assert commands.completed(signals, present, whole.labs, 0.002) == ()
+    signals, present = without(whole, EFFORT, COMMAND, TARGET, "displacement")
+    assert commands.completed(signals, present, whole.labs, 0.002) == ()
+
+
+@pytest.mark.parametrize("numbered", [True, False])
+def test_numbers_that_were_sent_are_taken_for_those_that_were_received(numbered: bool, cases: Cases) -> None:
+    whole, late = cases.record(), 6
+    signals, _ = without(whole, *([] if numbered else ["command_seq"]))
+    for name in (TARGET, EFFORT):
+        signals[name] = np.append(whole.signals[name][late:], [whole.signals[name][-1]] * late)
+    if numbered:
+        signals["command_seq"] = np.clip(np.arange(whole.ticks) - float(late), 0.0, None)
+    commands.received(signals, whole.labs)
+    for name in (TARGET, EFFORT):
+        assert np.array_equal(signals[name][late:], whole.signals[name][late:])
+
+
+def test_numbers_that_were_received_stay_as_they_are(cases: Cases) -> None:
+    whole = cases.record({"table.delay": {"delay": 0.012}})
+    signals, _ = without(whole)
+    commands.received(signals, whole.labs)
+    assert all(np.array_equal(signals[name], whole.signals[name]) for name in signals)
+
+
+def test_the_drift_of_the_building_stands_for_a_target_that_was_not_recorded(cases: Cases) -> None:
+    whole = cases.record()
+    own = lab_a(whole)
+    (command,) = own.wanted
+    signals, _ = without(whole, "column_target")
+    (values,) = lab_a(replace(whole, signals=signals)).wanted.values()
+    assert command == "actuator_command"
+    assert np.std(values - own.wanted[command]) < 1e-2 * np.std(values)
