@@ -92,26 +92,32 @@ def completed(
         gain = lab.kind.coupling(lab.plan).effort
         if not effort or effort in signals or gain == 0.0 or "displacement" not in signals:
             continue
-        there, used = following(present["displacement"]), in_force(signals, lab, present["displacement"].size)
-        force = gain * following(velocity(signals, lab, interval))
-        signals[effort], present[effort] = force[used], there[used]
+        force, there = gain * velocity(signals, lab, interval), present["displacement"]
+        used = in_force(signals, lab, there.size)
+        signals[effort], present[effort] = following(force)[used], following(there)[used]
     return tuple(sorted(set(signals) - before))
 
 
 def velocity(signals: dict[str, Array], lab: RecordedLaboratory, interval: float) -> Array:
     """Velocity (ticks,) of what a laboratory follows, m/s: as recorded, or the slope of the displacement."""
-    coupling = lab.kind.coupling(lab.plan)
-    known = "velocity" in signals
-    rows = signals["velocity" if known else "displacement"]
-    floors = rows.reshape(len(rows), -1)
-    motion = floors[:, coupling.place - 1]
-    if coupling.follows is Follows.DRIFT and coupling.place > 1:
-        motion = motion - floors[:, coupling.place - 2]
-    if known or motion.size < SMOOTHED:
-        return motion if known else np.gradient(motion, interval)
+    if "velocity" in signals:
+        return followed(signals["velocity"], lab)
+    motion = followed(signals["displacement"], lab)
+    if motion.size < SMOOTHED:
+        return np.gradient(motion, interval)
     from scipy import signal
 
     return np.asarray(signal.savgol_filter(motion, SMOOTHED, DEGREE, deriv=1, delta=interval))
+
+
+def followed(building: Array, lab: RecordedLaboratory) -> Array:
+    """What a laboratory follows (ticks,) of the building's motion (ticks,) or (ticks, storeys): a floor or a drift."""
+    coupling = lab.kind.coupling(lab.plan)
+    floors = building.reshape(len(building), -1)
+    floor = floors[:, coupling.place - 1]
+    if coupling.follows is Follows.DRIFT and coupling.place > 1:
+        return np.asarray(floor - floors[:, coupling.place - 2])
+    return np.asarray(floor)
 
 
 def in_force(signals: dict[str, Array], lab: RecordedLaboratory, ticks: int) -> NDArray[np.int_]:

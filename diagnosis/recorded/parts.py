@@ -14,6 +14,7 @@ import numpy as np
 
 from common.plan.kinds import COLUMN
 from common.plan.plan import Plan
+from diagnosis.recorded.commands import followed
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import (
     BETWEEN,
@@ -106,9 +107,7 @@ def drift(record: Record, lab: RecordedLaboratory) -> Array | None:
     coupling = lab.kind.coupling(lab.plan)
     if coupling.follows is not Follows.DRIFT or not record.has("displacement"):
         return None
-    floors = record.signals["displacement"].reshape(record.ticks, -1)
-    below = floors[:, coupling.place - 2] if coupling.place > 1 else 0.0
-    return np.asarray(coupling.ratio * (floors[:, coupling.place - 1] - below))
+    return coupling.ratio * followed(record.signals["displacement"], lab)
 
 
 def outputs(record: Record, names: tuple[str, ...]) -> tuple[Array, Mask]:
