@@ -173,7 +173,7 @@ class RecordingGaps:
         """Gap that noise alone makes, with the lines that sensors pick up."""
         found = self.found
         if self.loop is None:
-            return {name: self.over(name, found.noise(name)) for name in found.white}
+            return {name: self.over(name, found.noise(name)) for name in found.white if name in self._there}
         systems = found.systems(plans=self.record.plans, noisy=False)
         noisy = self.loop.floor(systems, found.white, self.mask)
         lines = {name: self.over(name, found.lines.get(name, 0.0)) for name in noisy}

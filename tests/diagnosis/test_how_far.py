@@ -196,7 +196,8 @@ def test_parts_without_a_loop_are_compared_behind_the_logger(loopless: Diagnosis
 
 def test_a_recording_of_other_parts_judges_nothing_and_says_so(cases: Cases, loopless: Diagnosis) -> None:
     run = read(cases.file(FOUND["damper"]))
-    for name in ("table_target", "table_command", "damper_command", "actuator_command", "column_force"):
+    commands = ("table_target", "table_command", "damper_command", "actuator_command")
+    for name in ("displacement", "column_force", *commands):
         for topic in ("master", "slave"):
             run.columns[topic].pop(name, None)
     warned = how_far.judge(loopless, [record.build(run)])

@@ -26,6 +26,7 @@ from diagnosis.fits.search import Search, search
 from diagnosis.recorded.building import logged_building
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import LoggedBuilding
+from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.loop import RecordedLoop
 from diagnosis.recorded.nuisances import CALIBRATED
@@ -34,7 +35,8 @@ from diagnosis.report.records import HowFar
 from diagnosis.signals import alike
 from diagnosis.signals.earlier import earlier
 from models.registry import Array
-from tests.diagnosis.cases import STRONGEST, Cases, lab_a, white
+from models.system import System
+from tests.diagnosis.cases import STRONGEST, Cases, imported, lab_a, white
 
 LEVEL = 200.0  # N
 LATE = 2  # ticks
@@ -354,3 +356,25 @@ def test_a_simulated_response_passes_the_stated_filter_of_its_reading(cases: Cas
     ]
     known, unknown = (loop.gap(loop.simulate(loop.record.systems))["column_force"] for loop in loops)
     assert known < 0.25 * unknown
+
+
+@pytest.mark.long
+def test_noise_that_the_motion_has_and_the_log_has_not_moves_no_parameter(cases: Cases) -> None:
+    """The nominal parameters are the true ones, and the log has as much noise as the master read, of its own."""
+    whole = cases.record(seed=0, duration=20.0)
+    true = lab_a(whole).predict(System(whole.plan))[:, 1]
+    rms = float(np.std(whole.signals["column_force"] - true))
+    logged = imported(whole)
+    used = {name: whole.signals[name] for name in ("damper_force_used",)}
+    read = {"column_force": true + rms * white(5, true.size)}
+    logged = replace(logged, signals=logged.signals | used | read)
+    found = LoggedBuilding(next(part for part in parts_of(logged) if isinstance(part, Building)))
+    assert found.of_motion == pytest.approx(0.5, abs=0.1)
+
+    def moved(building: LoggedBuilding) -> Array:
+        data = residuals.prepare(building, logged, {})
+        return fitting.fit(over_longer(data, building) or data, {}).z
+
+    assert np.max(np.abs(moved(found))) < 0.3
+    found.of_motion = 0.0
+    assert np.min(moved(found)[:3]) < -0.8

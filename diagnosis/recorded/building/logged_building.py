@@ -20,6 +20,8 @@ from models.structures import shear_building
 from models.system import System
 
 BALANCE = "force_balance"  # signal of a building that is judged by the balance of its forces, N
+PER_PERIOD = 12  # averages in the shortest period, of which noise is told from the motion
+FEWEST = 50  # of averages at least, by which noise is known
 SURE = 3.0  # standard deviations from which on a stated filter is taken to lie before the master
 
 
@@ -48,6 +50,12 @@ def before_master(plain: Array, behind: Array) -> bool:
     return part > max(0.5 * energy, SURE * math.sqrt(energy * float(np.mean(np.square(left)))))
 
 
+def white_noise(values: Array) -> float:
+    """Mean square of what is white in values (ticks, storeys), by fourth differences, over all storeys."""
+    apart = 1.4826 * np.median(np.abs(np.diff(values, n=4, axis=0)), axis=0)
+    return float(np.sum(np.square(apart))) / 70.0
+
+
 class LoggedBuilding(Building):
     """The numerical substructure whose forces came through a logger, by the balance of its forces.
 
@@ -60,6 +68,9 @@ class LoggedBuilding(Building):
     the others: the balance of a linear building holds behind a filter as it does before it, and no filter is undone.
     A delay beyond those stated is then one of the forces that the logger filtered: others are the master's own numbers.
     So are they where the balance is far likelier if the own laboratory's force `alone` came through the logger.
+
+    The master read its forces with noise, which the motion has, and the log may have noise of its own in their place. A
+    building of a smaller mass would have less of the noise of the motion.
     """
 
     exact = False
@@ -67,6 +78,7 @@ class LoggedBuilding(Building):
     def __init__(self, of: Building, *, behind: bool = False) -> None:
         self.__dict__.update(of.__dict__)
         self.behind = behind
+        moved = white_noise(self.balance(System(self._plan), self.motion))
         if behind:
             self.pass_alike()
         plan = self._plan
@@ -78,10 +90,33 @@ class LoggedBuilding(Building):
         rows = (("delay", late, self.about), ("gain", self._stated.calibration or CALIBRATED, 0.0))
         logger = tuple(LoggedForce(name, by, None, self._force, at) for name, by, at in rows if self._force)
         self.nuisances = (*of.nuisances, *logger)
-        self.alone = False
+        self.alone, self.of_motion = False, 0.0
         whole = bool(of.present.all()) and len(self.measured) >= LEAST_TICKS
         if of.linear and not behind and whole and len(self.sources) > 1:
             self.alone = self.delayed_alone()
+        if whole:
+            self.of_motion = self.noise_of_motion(moved)
+
+    def noise_of_motion(self, moved: float) -> float:
+        """The share of what the balance leaves that is noise of the motion, of which `moved` is the mean square, N².
+
+        It is that of averages over a twelfth of the shortest period, less what nominal parameters make up for. Noise of
+        the log may have any colour, while that of the motion is taken for white. Noise that the log has as well leaves
+        nothing, by what is left of it at the highest frequencies.
+        """
+        size = max(1, min(round(self.shortest / (PER_PERIOD * self._interval)), len(self.measured) // FEWEST))
+        system = System(self._plan)
+        systems = [system, *(one.moved(system, 1.0) for one in self.nuisances)]
+        left = np.stack([self.left(one) for one in systems])[:, : len(self.measured) // size * size]
+        sums = left.reshape(len(systems), -1, size, left.shape[2]).sum(axis=2) / math.sqrt(size)
+        rest, *others = sums.reshape(len(systems), -1)
+        slopes = np.stack(others, axis=1) - rest[:, None]
+        rest = rest - slopes @ np.linalg.lstsq(slopes, rest)[0]
+        level = float(np.mean(np.square(rest))) * left.shape[2]
+        fast, noise = (np.diff(x, n=4, axis=0)[::5].ravel() for x in (self.left(), self.measured))
+        energy = float(noise @ noise)
+        apart = max(0.0, float(fast @ noise) / energy) if energy > 0.0 else 0.0
+        return min(1.0, apart * moved / level) if level > 0.0 else 0.0
 
     def delayed_alone(self) -> bool:
         """Whether what was recorded of the other forces is what the master used, and only the own one is delayed."""
@@ -149,11 +184,15 @@ class LoggedBuilding(Building):
     def predict(self, system: System) -> Array:
         """The balance of the nominal building, less the residual balance of the hypothesis.
 
-        What it leaves is at the time and in the unit of the reading, so that neither delay nor gain changes its noise.
+        What it leaves is at the time of the reading, and over what changes its noise: a gain that of the motion and a
+        mass as well, which the reading has not. So the parameters that leave least are those that explain most.
         """
         delay, gain = self.logger(system)
         apart = self.balance(system, self.motion - self.computed(system))
-        return self.measured - gain * earlier(apart, -delay / self._interval)
+        masses = [float(np.trace(partition.numerical(plan)[0])) for plan in (system.plan, self._plan)]
+        louder = gain * masses[0] / masses[1]
+        over = math.sqrt(1.0 + self.of_motion * (louder**2 - 1.0))
+        return self.measured - gain / over * earlier(apart, -delay / self._interval)
 
     def forces(self, system: System) -> tuple[Array, Array, Array]:
         """Position and force of the master's laboratory and the forces of the others, as the master used them."""
