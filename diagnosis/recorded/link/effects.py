@@ -155,7 +155,8 @@ def lossy(found: LinkAccount) -> LinkFinding | None:
             (float(min(1.0 / quick, 1.0 / leave)), float(max(1.0 / slow, 1.0 / leave))),
         ),
     }
-    text = f"{lost} of {tried} messages never arrived"
+    late = "" if found.stamped else " in time: without time stamps late ones look like lost ones"
+    text = f"{lost} of {tried} messages never arrived{late}"
     return LinkFinding("link.loss", values, text, certainty(math.sqrt(lost * heavy), 1.0))
 
 
