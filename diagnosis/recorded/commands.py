@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +24,7 @@ LATEST = 25  # ticks by which messages are late at most, where it is looked for
 NEARER, NEAR = 0.2, 1e-3
 
 Number = TypeVar("Number", np.float64, np.bool_)
+Ticks = NDArray[np.int_]
 
 
 def at_targets(
@@ -46,12 +48,13 @@ def wanted(values: Array, there: Mask, *, at_end: bool) -> tuple[Array, Mask]:
     return (values, there) if at_end else (following(values), following(there))
 
 
-def received(signals: dict[str, Array], labs: tuple[RecordedLaboratory, ...]) -> None:
-    """Put what slaves received in the place of what a log has as it was sent.
+def received(signals: dict[str, Array], labs: tuple[RecordedLaboratory, ...]) -> dict[str, Ticks]:
+    """Put what slaves received in the place of what a log has as it was sent; the ticks that they received, by role.
 
     Without a compensator a slave's command is the target that it received. Where it is the target of an earlier tick,
     the log has the master's own numbers, of which the others are on their way as long.
     """
+    found: dict[str, Ticks] = {}
     for lab in labs:
         channels = lab.kind.channels
         command, *sent = (lab.signal(one.name) for one in (channels.command, *channels.driving))
@@ -66,6 +69,8 @@ def received(signals: dict[str, Array], labs: tuple[RecordedLaboratory, ...]) ->
         best = int(np.argmin(missed))
         if missed[best] < min(NEARER * np.std(reached - target), NEAR * np.std(reached)):
             signals |= {name: signals[name][ways[best]] for name in sent if name in signals}
+            found[lab.role] = ways[best]
+    return found
 
 
 def completed(
@@ -73,12 +78,14 @@ def completed(
     present: dict[str, Mask],
     labs: tuple[RecordedLaboratory, ...],
     interval: float,
+    known: Mapping[str, Ticks],
 ) -> tuple[str, ...]:
     """Add the commands of slaves that were not recorded and follow from what was, and return their names.
 
     Without a compensator a slave's command is the target that it received. The force of its motor follows from the
-    plan's control and the building's velocity at the end of the interval, on its way by what the numbers of the
-    messages say. What a controller did otherwise than planned looks like an effect in the laboratory then.
+    plan's control and the building's velocity at the end of the interval, on its way as long as targets that are known
+    to be, by role, or by what the numbers of the messages say. What a controller did otherwise than planned looks like
+    an effect in the laboratory then.
     """
     before = set(signals)
     for lab in labs:
@@ -93,7 +100,7 @@ def completed(
         if not effort or effort in signals or gain == 0.0 or "displacement" not in signals:
             continue
         force, there = gain * velocity(signals, lab, interval), present["displacement"]
-        used = in_force(signals, lab, there.size)
+        used = known.get(lab.role, in_force(signals, lab, there.size))
         signals[effort], present[effort] = following(force)[used], following(there)[used]
     return tuple(sorted(set(signals) - before))
 
@@ -120,7 +127,7 @@ def followed(building: Array, lab: RecordedLaboratory) -> Array:
     return np.asarray(floor)
 
 
-def in_force(signals: dict[str, Array], lab: RecordedLaboratory, ticks: int) -> NDArray[np.int_]:
+def in_force(signals: dict[str, Array], lab: RecordedLaboratory, ticks: int) -> Ticks:
     """The tick (ticks,) of whose message a slave has its commands, by the numbers of messages.
 
     They may begin anywhere, so that most messages are taken to come in time; all are where no numbers were recorded.

@@ -28,7 +28,7 @@ def test_the_commands_that_a_log_leaves_out_are_those_of_the_plans_control(
 ) -> None:
     whole = cases.record()
     signals, present = without(whole, EFFORT, COMMAND, *left_out)
-    assert commands.completed(signals, present, whole.labs, 0.002) == (EFFORT, COMMAND)
+    assert commands.completed(signals, present, whole.labs, 0.002, {}) == (EFFORT, COMMAND)
     assert np.array_equal(signals[COMMAND], whole.signals[COMMAND])
     true = whole.signals[EFFORT]
     assert np.std(signals[EFFORT] - true) < 1e-3 * np.std(true)
@@ -41,7 +41,7 @@ def test_a_command_is_on_its_way_as_long_as_the_numbers_of_messages_say(cases: C
     numbers: Array = 7000.0 + np.arange(whole.ticks, dtype=np.float64)
     numbers[500:503] = numbers[499]
     signals["command_seq"] = numbers
-    commands.completed(signals, present, whole.labs, 0.002)
+    commands.completed(signals, present, whole.labs, 0.002, {})
     assert np.array_equal(signals[EFFORT][500:503], [signals[EFFORT][499]] * 3)
     assert signals[EFFORT][503] == pytest.approx(whole.signals[EFFORT][503], rel=1e-2)
 
@@ -49,9 +49,9 @@ def test_a_command_is_on_its_way_as_long_as_the_numbers_of_messages_say(cases: C
 def test_nothing_is_worked_out_of_what_was_recorded_or_cannot_be_known(cases: Cases) -> None:
     whole = cases.record()
     signals, present = without(whole)
-    assert commands.completed(signals, present, whole.labs, 0.002) == ()
+    assert commands.completed(signals, present, whole.labs, 0.002, {}) == ()
     signals, present = without(whole, EFFORT, COMMAND, TARGET, "displacement")
-    assert commands.completed(signals, present, whole.labs, 0.002) == ()
+    assert commands.completed(signals, present, whole.labs, 0.002, {}) == ()
 
 
 @pytest.mark.parametrize("numbered", [True, False])
@@ -65,6 +65,17 @@ def test_numbers_that_were_sent_are_taken_for_those_that_were_received(numbered:
     commands.received(signals, whole.labs)
     for name in (TARGET, EFFORT):
         assert np.array_equal(signals[name][late:], whole.signals[name][late:])
+
+
+def test_a_force_that_is_worked_out_is_on_its_way_as_long_as_the_targets_are(cases: Cases) -> None:
+    whole, late = cases.record(), 6
+    signals, present = without(whole, EFFORT)
+    signals[TARGET] = np.append(whole.signals[TARGET][late:], [whole.signals[TARGET][-1]] * late)
+    ways = commands.received(signals, whole.labs)
+    commands.completed(signals, present, whole.labs, 0.002, ways)
+    expected, _ = without(whole, EFFORT)
+    commands.completed(expected, dict(present), whole.labs, 0.002, {})
+    assert np.array_equal(signals[EFFORT][late:], expected[EFFORT][:-late])
 
 
 def test_numbers_that_were_received_stay_as_they_are(cases: Cases) -> None:
