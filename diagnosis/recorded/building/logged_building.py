@@ -59,8 +59,8 @@ def white_noise(values: Array) -> float:
 class LoggedBuilding(Building):
     """The numerical substructure whose forces came through a logger, by the balance of its forces.
 
-    The motion is the master's own and free of noise, so what the equation of motion says of it differs from the forces
-    recorded by their logger's noise alone, sample by sample. In the displacement that noise would have gone through
+    The motion is the master's own number, so what the equation of motion says of it differs from the forces recorded by
+    noise of their readings alone, sample by sample. In the displacement that noise would have gone through
     the building, and would look like a motion. The logger's delay and gain join the nominal parameters; what it does to
     one force it mostly does to all.
 
@@ -110,8 +110,9 @@ class LoggedBuilding(Building):
         left = np.stack([self.left(one) for one in systems])[:, : len(self.measured) // size * size]
         sums = left.reshape(len(systems), -1, size, left.shape[2]).sum(axis=2) / math.sqrt(size)
         rest, *others = sums.reshape(len(systems), -1)
-        slopes = np.stack(others, axis=1) - rest[:, None]
-        rest = rest - slopes @ np.linalg.lstsq(slopes, rest)[0]
+        if others:
+            slopes = np.stack(others, axis=1) - rest[:, None]
+            rest = rest - slopes @ np.linalg.lstsq(slopes, rest)[0]
         level = float(np.mean(np.square(rest))) * left.shape[2]
         fast, noise = (np.diff(x, n=4, axis=0)[::5].ravel() for x in (self.left(), self.measured))
         energy = float(noise @ noise)
