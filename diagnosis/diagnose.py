@@ -343,8 +343,8 @@ def not_recorded(record: Record) -> list[str]:
         result.append("The recording holds no message numbers or time stamps, so the link cannot be judged.")
     if record.worked_out:
         result.append(
-            f"Not recorded: {', '.join(record.worked_out)}, which is worked out from the plan's control. Record it to "
-            "have the control judged apart from the laboratory."
+            f"Not recorded, and worked out from the plan's control: {', '.join(record.worked_out)}. Record it to have "
+            "the control judged apart from the laboratory."
         )
     unused = [name for name in used(record) if not record.has(name)]
     if record.has(*BUILDING) and unused and not record.plan.foreign:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from common.errors import InputError
-from diagnosis.recorded.building.logged_building import LoggedBuilding
+from diagnosis.recorded.building.logged_building import PER_PERIOD, LoggedBuilding
 from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, Part
 from diagnosis.recorded.record import Record
 from diagnosis.signals import colour
@@ -28,7 +28,6 @@ from models.registry import Array
 from models.system import System
 
 AVERAGED = 0.008  # s, over which residuals are averaged: the laboratories move much more slowly
-PER_PERIOD = 12  # long averages in the shortest period of a building whose forces a logger recorded
 FEWEST = 250  # of these that a recording must have: noise of a colour is known from no fewer
 BLOCK = 1.0  # s, of the blocks that are held out in turn: longer than a model's error is correlated
 HELD_OUT = (2, 4)  # of every five blocks, these

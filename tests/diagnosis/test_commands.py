@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.recorded import commands
+from common.recording.reader import read
+from diagnosis.diagnose import not_recorded
+from diagnosis.recorded import commands, record
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from models.registry import Array
@@ -33,6 +35,14 @@ def test_the_commands_that_a_log_leaves_out_are_those_of_the_plans_control(
     true = whole.signals[EFFORT]
     assert np.std(signals[EFFORT] - true) < 1e-3 * np.std(true)
     assert present[EFFORT].all()
+
+
+def test_the_report_says_what_was_worked_out(cases: Cases) -> None:
+    run = read(cases.file())
+    for topic in ("master", "slave"):
+        run.columns[topic].pop(EFFORT, None)
+    (said,) = [one for one in not_recorded(record.build(run)) if EFFORT in one]
+    assert said.startswith("Not recorded, and worked out from the plan's control: damper_command.")
 
 
 def test_a_command_is_on_its_way_as_long_as_the_numbers_of_messages_say(cases: Cases) -> None:

@@ -205,6 +205,17 @@ def test_a_recording_of_other_parts_judges_nothing_and_says_so(cases: Cases, loo
     assert any("no part" in text for text in warned.warnings)
 
 
+def test_a_recording_without_a_reading_that_was_judged_before_still_judges(
+    cases: Cases, loopless: Diagnosis
+) -> None:
+    run = read(cases.file(FOUND["damper"]))
+    for topic in ("master", "slave"):
+        run.columns[topic].pop("column_force", None)
+    found = how_far.judge(loopless, [record.build(run)]).how_far
+    assert found.judged_on != "interleaved (interpolation)"
+    assert found.noise_floor
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     "effects",

@@ -158,6 +158,7 @@ def test_without_time_stamps_few_messages_that_were_lost_in_bursts_are_found() -
     link = ImpairedLink(loss=0.002, burst=3.0, seed=8)
     (found,) = findings(account(recorded(link, stamps=False), DT), DT)
     assert found.effect == "link.loss"
+    assert "late ones look like lost ones" in found.evidence
     probability, burst = found.parameters["probability"], found.parameters["burst"]
     assert probability[1][0] <= 0.002 <= probability[1][1]
     assert burst[1][0] <= 3.0 <= burst[1][1]

@@ -13,7 +13,7 @@ from scipy import signal
 
 from common.recording.imported import IMPORT, ImportedChannel, LoggerFilter
 from common.roles import MASTER
-from diagnosis.diagnose import diagnose
+from diagnosis.diagnose import diagnose, put_right
 from diagnosis.findings.logged import delays, logger
 from diagnosis.fits import residuals
 from diagnosis.fits.fitting import fit
@@ -144,7 +144,7 @@ def test_forces_that_come_later_than_behind_a_stated_filter_are_the_loggers(case
     whole = behind(cases.record(), BUTTERWORTH, lambda x: BUTTERWORTH.filtered(x, 1.0 / RATE))
     names = ("column_force", "damper_force")
     assert delays.delayed(whole).delayed == {}
-    found = delays.delayed(later(whole, names)).delayed
+    found = put_right(later(whole, names)).delayed
     assert {name for _, name in found} == set(names)
     assert list(found.values()) == pytest.approx([0.004] * 2, rel=0.1)
     assert delays.delayed(later(whole, names[1:])).delayed == {}

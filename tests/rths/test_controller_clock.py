@@ -69,6 +69,14 @@ def test_the_number_of_a_message_is_that_which_was_in_force_from_its_tick_on(
     assert np.array_equal(clock.latest(times, ticks, t), np.arange(1.0, 5900.0))
 
 
+def test_a_tick_that_a_slow_logger_passes_over_has_the_number_between_its_neighbours() -> None:
+    times, ticks, _ = logged(500.0, 1.995e-3, -40.0)
+    clock = ControllerClock(INTERVAL, -1.995e-3 * (1.0 - 4e-5), -4e-5)
+    t = INTERVAL * np.arange(1.0, 5900.0)
+    assert np.count_nonzero(np.diff(ticks) == 2.0) == 1
+    assert np.array_equal(clock.latest(times, ticks, t), np.arange(1.0, 5900.0))
+
+
 def test_rows_of_twice_the_rate_say_between_which_of_them_the_ticks_are() -> None:
     times, ticks, values = logged(1000.0, -0.3e-3, 0.0)
     found = clock_of(times, [values], INTERVAL)

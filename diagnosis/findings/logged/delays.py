@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged.filters import AlikeReadings, LikelyFilter, in_common, of_laboratories
+from diagnosis.findings.logged.means import alike
 from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import LEAST_TICKS, Record
@@ -42,11 +43,8 @@ def later(readings: list[AlikeReadings]) -> list[LikelyFilter]:
 
 def remarks(found: Diagnosis) -> list[str]:
     """A sentence for each delay beside stated filters."""
-    alike: dict[float, list[str]] = {}
-    for (_, name), delay in found.record.delayed.items():
-        alike.setdefault(delay, []).append(name)
     return [
         f"{' and '.join(names)} come {1e3 * delay:.2g} ms later than behind the filters that the import map states, in "
         "all laboratories alike, which is taken for the data logger's delay: state it as `delay`."
-        for delay, names in alike.items()
+        for delay, names in alike(found.record.delayed).items()
     ]

@@ -6,6 +6,7 @@ frequency f away: 0.07 % at 2 Hz of a mean over 10 ms, which a filter that only 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -49,11 +50,16 @@ def without_delay(length: float) -> ImportedChannel:
 
 def remarks(found: Diagnosis) -> list[str]:
     """A sentence for each time over which readings were taken for means."""
-    alike: dict[float, list[str]] = {}
-    for (_, name), length in found.record.averaged.items():
-        alike.setdefault(length, []).append(name)
     return [
         f"{' and '.join(names)} are means over {1e3 * length:.3g} ms, by what they have of fast motion, and the "
         "import map does not state it. It was taken into account; state it as `average`."
-        for length, names in alike.items()
+        for length, names in alike(found.record.averaged).items()
     ]
+
+
+def alike(channels: Mapping[tuple[str, str], float]) -> dict[float, list[str]]:
+    """The names of channels by what they have in common, from what each has by topic and name."""
+    names: dict[float, list[str]] = {}
+    for (_, name), value in channels.items():
+        names.setdefault(value, []).append(name)
+    return names
