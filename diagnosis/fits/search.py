@@ -14,7 +14,7 @@ from diagnosis.fits.laws.coupled import coupled
 from diagnosis.fits.laws.loop import of_one_loop, single, whole_loops
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
-from diagnosis.fits.trade import tied
+from diagnosis.fits.trade import plainer, tied
 from diagnosis.fits.unexplained import MATERIAL, foresees, leaves, model_error, remaining, resonant
 from diagnosis.recorded.joined import column_of
 
@@ -311,7 +311,7 @@ def likeliest(search: Search) -> Search:
     chosen = search.chosen
     same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
     best = min(same, key=lambda fit: fit.cost, default=chosen)
-    if best.cost > chosen.cost - fitting.TIED or remaining(best) > remaining(chosen):
+    if best.cost > chosen.cost - fitting.TIED or remaining(best) > remaining(chosen) or plainer(chosen, best):
         return search
     return in_front(search, best)
 
@@ -341,18 +341,20 @@ def in_front(search: Search, stands: Fit) -> Search:
 def plainest(search: Search) -> Search:
     """The search with that one in front of as many effects that the data cannot tell from the chosen ones.
 
-    A machine's effect stands before a sensor's, then the one with the fewest free parameters, then the likeliest, where
-    one of several laws is as likely as any other of its effect.
+    A machine's effect stands before a sensor's, then the one with the fewest free parameters, then other values of the
+    plan before laws, then the likeliest, where one of several laws is as likely as any other of its effect.
     """
     catalogue, chosen = search.data.catalogue, search.chosen
 
-    def order(fit: Fit) -> tuple[int, int, float]:
+    def order(fit: Fit) -> tuple[int, int, int, float]:
         artefacts = sum(catalogue[name].kind == "measurement" for name in fit.names)
         laws = sum(math.log(max(1, len(catalogue[name].laws))) for name in fit.names)
-        return artefacts, trade.freedom(fit)[0], fit.cost + 2.0 * laws
+        beyond = len(fit.names) - len(hypothesis.values_of_plan(fit.data, fit.values))
+        return artefacts, trade.freedom(fit)[0], beyond, fit.cost + 2.0 * laws
 
     same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
-    return in_front(search, min([chosen, *(item for item in same if tied(chosen, item))], key=order))
+    level = [item for item in same if tied(chosen, item) or plainer(item, chosen)]
+    return in_front(search, min([chosen, *level], key=order))
 
 
 def exchanged_pair(chosen: Fit, other: Fit) -> tuple[str, str] | None:

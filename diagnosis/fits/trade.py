@@ -14,14 +14,14 @@ import numpy as np
 
 from diagnosis.fits import candidates, fitting, worth
 from diagnosis.fits.fitting import TIED, Fit, excess
-from diagnosis.fits.hypothesis import Problem, left_out
+from diagnosis.fits.hypothesis import Problem, Values, left_out, values_of_plan
 from diagnosis.fits.laws.afresh import afresh
 from diagnosis.fits.laws.best import ROUNDS, STEPS, begun, descended, fitted, raced
 from diagnosis.fits.laws.loop import of_one_loop, single
 from diagnosis.fits.laws.unlike_first import unlike_first
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.threads import each
-from diagnosis.fits.unexplained import leaves
+from diagnosis.fits.unexplained import MATERIAL, leaves, model_error
 
 # Squared distance of two predictions, in noise. Where one of them is true, their costs differ by this distance, give or
 # take twice its root: from here on by more than `TIED`, but for one chance in a thousand.
@@ -46,6 +46,17 @@ def tied(chosen: Fit, other: Fit) -> bool:
     noise = max(1.0, chosen.chi / chosen.data.size)
     apart = float(np.sum(np.square(other.reduced - chosen.reduced)))
     return (other.cost - chosen.cost) / noise < TIED and apart / noise < APART
+
+
+def plainer(fit: Fit, other: Fit) -> bool:
+    """Whether a fit with fewer free parameters than another one does the same to what good solutions differ by.
+
+    So small a difference, which nobody could see, is no reason for a further parameter: it may come from the formula.
+    """
+    if freedom(fit)[0] >= freedom(other)[0] or (leaves(fit) and not leaves(other)):
+        return False
+    apart = np.sqrt(np.mean(np.square(fit.reduced - other.reduced), axis=0) / fit.data.group)
+    return bool(np.all(apart <= np.minimum(MATERIAL, model_error(other))))
 
 
 def on_all(fit: Fit, others: Sequence[Fit]) -> tuple[Fit, list[Fit]]:
@@ -106,7 +117,9 @@ def traded(
         found += parted(bare, chosen, scales)
         found += paired(bare, chosen, first, scales)
         found += released(chosen, scales)
-    return simplest([chosen, *found])
+    stands, as_good = simplest([chosen, *found])
+    plan = of_the_plan(bare, stands, first)
+    return simplest([stands, *as_good, *plan]) if plan else (stands, as_good)
 
 
 def simplest(fits: Sequence[Fit]) -> tuple[Fit, tuple[Fit, ...]]:
@@ -115,7 +128,7 @@ def simplest(fits: Sequence[Fit]) -> tuple[Fit, tuple[Fit, ...]]:
     One that moves nominal parameters too far to be an explanation stands behind those that do not.
     """
     best = min(fits, key=lambda item: item.cost)
-    level = [item for item in fits if tied(best, item)]
+    level = [item for item in fits if tied(best, item) or plainer(item, best)]
     sound = [] if worth.is_gap(best) else [item for item in level if not worth.is_gap(item)]
     stands = min(sound or level, key=freedom)
     return stands, tuple(item for item in level if len(item.names) != len(stands.names))
@@ -162,6 +175,36 @@ def under_others(fit: Fit) -> list[Fit]:
             less = fitting.fit(fit.data, rest | {name: fit.values[name]}, fit.z)
             result += raced([less], NEARING * excess(less)).values()
     return each(descended, [item for item in result if fitting.near(item, fit)])
+
+
+def of_the_plan(bare: Fit, fit: Fit, first: Sequence[Fit]) -> list[Fit]:
+    """Fits with two other values of the plan in the place of one law that moves as many parameters or more.
+
+    A table that is both late and slow looks like one whose oil gives way. One of the two by itself explains much then.
+    `first` are the fits with one effect; each of two begins at half of what it is alone.
+    """
+    if len(fit.names) != 1 or freedom(fit)[0] < 2 or leaves(fit):
+        return []
+    plain = [item for item in first if freedom(item)[0] == 1 and values_of_plan(item.data, item.values)]
+    if all(excess(item) > FOLLOWED * excess(bare) for item in plain):
+        return []
+    starts = [half(one) | half(other) for one, other in itertools.combinations(plain, 2)]
+    rough = each(lambda start: fitting.fit(fit.data, start, None, STEPS, rounds=ROUNDS), starts)
+    return each(descended, [item for item in rough if fitting.near(item, fit)])
+
+
+def half(fit: Fit) -> Values:
+    """The effects of a fit at half of what they are."""
+    catalogue = fit.data.catalogue
+    return {
+        name: given
+        | {
+            item.name: 0.5 * (item.null + given[item.name])
+            for item in catalogue[name].parameters
+            if not item.shape
+        }
+        for name, given in fit.values.items()
+    }
 
 
 def parted(bare: Fit, fit: Fit, scales: Scales) -> list[Fit]:

@@ -216,3 +216,16 @@ def test_two_effects_in_one_laboratory_are_both_found(cases: Cases) -> None:
     )
     assert named(report) == ["actuator.backlash", "column.yielding"]
     assert estimate(report, "actuator.backlash", "width") == pytest.approx(3e-4, rel=0.05)
+
+
+@pytest.mark.long
+def test_two_values_of_a_table_are_found_where_a_law_with_more_parameters_does_what_they_do(
+    cases: Cases,
+) -> None:
+    """An oil column in a part of the table's loop leaves nothing either, and moves three parameters."""
+    report = cases.report(
+        {"table.delay": {"delay": 0.008}, "table.bandwidth": {"factor": 0.65}}, duration=STRONGEST
+    )
+    assert named(report) == ["table.bandwidth", "table.delay"]
+    assert estimate(report, "table.delay", "delay") == pytest.approx(0.008, rel=0.25)
+    assert estimate(report, "table.bandwidth", "factor") == pytest.approx(0.65, rel=0.1)

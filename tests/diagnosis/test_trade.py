@@ -33,13 +33,33 @@ def test_if_two_descriptions_predict_the_same_the_one_with_fewer_free_parameters
 
 
 def test_a_description_that_fits_better_is_chosen_whatever_its_number_of_parameters() -> None:
-    one, two = fit(SIDED), fit(PAIR, 0.2)
+    one, two = fit(SIDED), fit(PAIR, 0.3)
     assert simplest([two, one]) == (one, ())
 
 
 def test_of_fits_that_the_data_cannot_tell_from_the_best_the_search_goes_on_with_the_simplest() -> None:
     best, simple, worse = fit(SIDED), fit(PAIR, 1e-4), fit({"damper.friction": COULOMB}, 0.2)
     assert foremost([best, simple, worse]) is simple
+
+
+@pytest.mark.parametrize(
+    ("moved", "error", "same"), [(0.1, 1.0, True), (0.1, 0.05, False), (0.13, 1.0, False), (-0.1, 1.0, True)]
+)
+def test_a_further_parameter_needs_more_than_good_solutions_differ_by_and_than_anybody_could_see(
+    monkeypatch: pytest.MonkeyPatch, moved: float, error: float, same: bool
+) -> None:
+    monkeypatch.setattr(trade, "model_error", lambda item: np.full(item.data.sigma.size, error))
+    step = moved * np.sqrt(DATA.group)
+    two, one = fit(SIDED), fit({"damper.friction": COULOMB}, step)
+    assert not tied(two, one)
+    assert trade.plainer(one, two) is same
+    assert not trade.plainer(two, one)
+    assert simplest([two, one])[0] is (one if same else min([one, two], key=lambda item: item.cost))
+
+
+def test_half_of_an_effect_lies_between_none_and_all_of_it() -> None:
+    values = {"table.delay": {"delay": 0.006}, "table.bandwidth": {"factor": 0.5}}
+    assert trade.half(fit(values)) == {"table.delay": {"delay": 0.003}, "table.bandwidth": {"factor": 0.75}}
 
 
 def test_fits_with_equal_costs_and_different_residuals_are_not_tied() -> None:

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.signals.clock import QUARTZ
 from models.registry import Array
 
 LEAST_RUNS = 40  # of rows of one value, from which on they may be those of a controller
@@ -29,8 +30,7 @@ ROUNDED = 0.03  # of an interval, by which the others may be missed
 ON_TICK = 0.01  # of an interval, within which the first row is on its tick
 TOWARDS = 0.1  # of an interval
 STEADY = 0.2  # share of the usual width of bounds that all of them have in common, of a clock that is in step
-# Of clocks: what a quartz errs by at most as a rule, what any errs by, and between rates that are tried.
-QUARTZ, FASTEST, STEP = 6e-5, 1e-3, 5e-7
+FASTEST, STEP = 1e-3, 5e-7  # of clocks: what any errs by at most, and between rates that are tried
 OTHER = 0.01  # share of neighbours within one interval that may differ in a channel that holds
 OFTEN = 0.5  # share of them from which on those whose rows are not on a tick decide
 # Of the ground: ticks around a row at which it may have been taken, distance to one over that to all others below which
