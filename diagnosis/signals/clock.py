@@ -16,8 +16,8 @@ from models.registry import Array
 
 BLOCKS = 12  # of a recording, by which the error of a rate is told
 SURE, ALONE = 6.0, 4.0  # standard errors of a common rate, and of the rate that each laboratory says
+USUALLY_SURE, USUALLY_ALONE = 4.0, 2.0  # the same of a rate up to `QUARTZ`, which needs less to be believed
 QUARTZ = 6e-5  # of a rate: what a quartz errs by at most as a rule
-USUALLY_SURE, USUALLY_ALONE = 4.0, 2.0  # the same of such a rate, which needs less to be believed
 MOST = 1e-3  # of a rate: a quartz errs by less than a tenth of it
 TAPS = 16  # samples on each side of an interpolation
 KAISER = 8.0  # shape of its window: errors below 1e-4 up to three quarters of the highest frequency
