@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from common.host.lateness import MOST, WINDOW
-from common.recording.run import Run
+from common.recording.run import Run, Values
 from common.roles import LATENCY, MASTER, kind_of
 
 
@@ -16,7 +16,7 @@ def late_ticks(run: Run) -> dict[str, Any] | None:
 
     The result is None on a virtual clock too, on which an effect may delay messages but the machine cannot be late.
     """
-    tables = [columns for topic, columns in run.columns.items() if kind_of(topic) == LATENCY]
+    tables = exchanges(run, "seq", "wake_lateness", "deadline_missed")
     if not any(columns["seq"].size for columns in tables):
         return None
     if not any(np.any(np.nan_to_num(columns["wake_lateness"])) for columns in tables):
@@ -28,6 +28,12 @@ def late_ticks(run: Run) -> dict[str, Any] | None:
     counted = np.concatenate([[0], np.cumsum(late)])
     within = counted[1:] - counted[np.maximum(np.arange(1, ticks + 1) - WINDOW, 0)]
     return {"late": int(late.sum()), "ticks": ticks, "worst": int(within.max()), "window": WINDOW}
+
+
+def exchanges(run: Run, *names: str) -> list[dict[str, Values]]:
+    """The latencies of the exchange with each slave of which all signals of these names were recorded."""
+    tables = [columns for topic, columns in run.columns.items() if kind_of(topic) == LATENCY]
+    return [columns for columns in tables if columns.keys() >= set(names)]
 
 
 def beside_client(run: Run) -> dict[str, int] | None:

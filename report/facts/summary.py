@@ -255,7 +255,7 @@ def known(indicator: Callable[..., Result], *signals: Any) -> Result | None:
 
 def late_ticks(run: Run) -> int | None:
     """Ticks in which a deadline was missed in the exchange with any slave, None where latency is not recorded."""
-    return ticks_where(run, lambda columns: columns["deadline_missed"].astype(bool))
+    return ticks_where(run, "deadline_missed", lambda missed: missed.astype(bool))
 
 
 def patience(run: Run) -> str:
@@ -265,7 +265,7 @@ def patience(run: Run) -> str:
 
 def missed_ticks(run: Run) -> int | None:
     """How many of the late ticks sent no command, because the master was late by a whole interval."""
-    return ticks_where(run, lambda columns: columns["command_sent_ns"] == 0)
+    return ticks_where(run, "command_sent_ns", lambda sent: sent == 0)
 
 
 def rejected(run: Run) -> dict[str, dict[str, int]]:
@@ -277,12 +277,12 @@ def rejected(run: Run) -> dict[str, dict[str, int]]:
     return found
 
 
-def ticks_where(run: Run, condition: Callable[[dict[str, Values]], Values]) -> int | None:
-    """Ticks in which a condition holds in the exchange with any slave, None where latency is not recorded."""
-    tables = [columns for topic, columns in run.columns.items() if kind_of(topic) == LATENCY]
+def ticks_where(run: Run, name: str, condition: Callable[[Values], Values]) -> int | None:
+    """Ticks in which a signal of the exchange with any slave meets a condition, None where it is not recorded."""
+    tables = lateness.exchanges(run, "seq", name)
     if not any(columns["seq"].size for columns in tables):
         return None
-    return int(np.unique(np.concatenate([columns["seq"][condition(columns)] for columns in tables])).size)
+    return int(np.unique(np.concatenate([columns["seq"][condition(columns[name])] for columns in tables])).size)
 
 
 def latencies(run: Run) -> dict[str, Any]:

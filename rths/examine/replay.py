@@ -66,6 +66,8 @@ def run(args: argparse.Namespace) -> int:
         matches = replay_master(recording, plan, progress.tell) | replay_slaves(
             recording, plan, progress.tell
         )
+    if not any(match.compared for match in matches.values()):
+        raise InputError(f"{args.file} cannot be replayed: it holds no signal that rths computes.")
     result = {name: vars(match) for name, match in matches.items()}
     same = all(match.differing == 0 for match in matches.values())
     if args.json:
@@ -82,7 +84,7 @@ def planned(recording: Run, place: str | None = None) -> Plan:
     """The whole plan in a recording; files of users' kinds are beside the recording, or beside the plan at `place`.
 
     Raises:
-        InputError: the recording was imported, or holds no plan, or one that cannot be read.
+        InputError: the recording was imported, holds no plan or one that cannot be read, or lacks what the master used.
     """
     from common.recording.imported import imported
     from report.facts.laboratories import whole_plan
@@ -94,12 +96,26 @@ def planned(recording: Run, place: str | None = None) -> Plan:
     plan = whole_plan(recording)
     if plan is None or not recording.has(MASTER):
         raise InputError(f"{recording.path} cannot be replayed: it lacks the plan or the master's signals.")
-    if place is None:
-        return plan
-    file = cli.plan_path(place)
-    if not file.is_file():
-        raise InputError(f"There is no plan {file}: give the path of a TOML file.")
-    return replace(plan, base=file.parent)
+    if place is not None:
+        file = cli.plan_path(place)
+        if not file.is_file():
+            raise InputError(f"There is no plan {file}: give the path of a TOML file.")
+        plan = replace(plan, base=file.parent)
+    if lacking := [name for name in inputs(plan) if name not in recording.columns[MASTER]]:
+        raise InputError(
+            f"{recording.path} cannot be replayed: its master's signals lack {', '.join(lacking)}."
+        )
+    return plan
+
+
+def inputs(plan: Plan) -> list[str]:
+    """The master's signals from which those that it computes follow."""
+    from laboratories import kinds
+
+    own = kinds.own(plan)
+    felt = [own.channels.position, own.channels.force] if own else []
+    used = [kinds.kind_of(plan, role).channels.used for role in plan.roles]
+    return ["seq", "t", *felt, *dict.fromkeys(used)]
 
 
 def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, Match]:
@@ -116,9 +132,10 @@ def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, 
     own = host.channels if host else None
     felt = [columns[name] for name in (own.position, own.force)] if own else []
     used, names = forces_used(plan, columns), ComputedSignals(plan)
-    held = held_ticks(recording, columns[own.command.name] if own else [])
+    held = held_ticks(recording, columns.get(own.command.name, []) if own else [])
     matches: dict[str, Match] = {}
-    command: dict[str, Any] = {name: np.zeros(recorded[name].shape[1:]) for name in names.held}
+    there = [name for name in names.held if name in recorded]
+    command: dict[str, Any] = {name: np.zeros(recorded[name].shape[1:]) for name in there}
     ordered = {hold.begun: hold.resumed for hold in holds(recording.events, plan.test.interval)}
     for tick, seq in enumerate(columns["seq"]):
         if seq != tick:
@@ -132,7 +149,9 @@ def replay_master(recording: Run, plan: Plan, tell: Tell = untold) -> dict[str, 
             outputs |= command
         command = {name: outputs[name] for name in names.held}
         for name, value in outputs.items():
-            matches.setdefault(name, Match()).take(columns["t"][tick], value, columns[name][tick])
+            match = matches.setdefault(name, Match())
+            if name in columns:
+                match.take(columns["t"][tick], value, columns[name][tick])
     return {f"{MASTER}/{name}": match for name, match in matches.items()}
 
 
@@ -209,9 +228,9 @@ def held_ticks(recording: Run, commands: Sequence[float]) -> set[int]:
     if not recording.roles:
         return {tick for tick in range(1, len(commands)) if commands[tick] == commands[tick - 1]}
     topic = latency_topic(recording.roles[0])
-    if not recording.has(topic):
+    latency = recording.columns.get(topic, {})
+    if not {"seq", "command_sent_ns"} <= latency.keys():
         return set()
-    latency = recording.columns[topic]
     return {
         int(seq) for seq, sent in zip(latency["seq"], latency["command_sent_ns"], strict=True) if sent == 0
     }
@@ -251,18 +270,19 @@ def replay_exchange(whole: Run, plan: Plan, role: str) -> dict[str, Match]:
     slave = {name: values.tolist() for name, values in recording.columns[SLAVE].items()}
     master = {name: values.tolist() for name, values in recording.columns[MASTER].items()}
     sent = {seq: place for place, seq in enumerate(master["seq"])}
-    read = {seq: place for place, seq in enumerate(slave["seq"])}
+    read = {seq: place for place, seq in enumerate(slave.get("seq", []))}
     pairs = list(zip(sent_names(plan)[role], channels.sent, strict=True))
     force, used = channels.force, channels.used
     matches = {name: Match() for name in (*channels.sent, channels.command.name, used)}
     ramp = whole.ramps.get(role, {}).get("seq", ())
     replay_command(plan, role, slave, matches[channels.command.name], set(map(int, ramp)))
-    for place, t in enumerate(slave["t"]):
-        if (source := sent.get(slave["command_seq"][place])) is not None:
+    for place, (t, seq) in enumerate(zip(slave.get("t", []), slave.get("command_seq", []), strict=False)):
+        if (source := sent.get(seq)) is not None:
             for there, here in pairs:
-                matches[here].take(t, master[there][source], slave[here][place])
-    for place, t in enumerate(master["t"]):
-        if (source := read.get(master[channels.used_seq][place])) is not None:
+                if there in master and here in slave:
+                    matches[here].take(t, master[there][source], slave[here][place])
+    for place, (t, seq) in enumerate(zip(master["t"], master.get(channels.used_seq, []), strict=False)):
+        if (source := read.get(seq)) is not None and force in slave:
             matches[used].take(t, slave[force][source], master[used][place])
     return matches
 
@@ -275,6 +295,9 @@ def replay_command(plan: Plan, role: str, slave: dict[str, Any], match: Match, r
 
     kind = kind_of(plan, role)
     channels, step = kind.channels, SlaveStep(plan.of(role), kind)
+    needed = "t", "seq", channels.target.name, *channels.rates, *channels.names, channels.command.name
+    if not slave.keys() >= set(needed):
+        return
     for place, (t, seq) in enumerate(zip(slave["t"], slave["seq"], strict=True)):
         if seq != place:
             break
@@ -291,10 +314,13 @@ def show(matches: dict[str, Match], same: bool) -> None:
     from report.text.terminal import table
 
     rows = [["signal", "ticks", "differing", "first at", "largest"]]
-    for name, match in matches.items():
+    compared = {name: match for name, match in matches.items() if match.compared}
+    for name, match in compared.items():
         first = "" if match.first is None else f"{match.first:.3f} s"
         rows.append(
             [name, str(match.compared), str(match.differing), first, f"{match.largest:.3g}" if first else ""]
         )
     table(rows)
+    if absent := [name for name in matches if name not in compared]:
+        sys.stdout.write(f"not recorded, and not compared: {', '.join(absent)}\n")
     sys.stdout.write("matches to the last bit\n" if same else "does not match\n")

@@ -69,6 +69,20 @@ def test_without_recorded_latency_late_ticks_are_not_mentioned(virtual_recording
     assert late.warning(None) == ""
 
 
+@pytest.mark.parametrize("topic", ["master", "slave", "latency"])
+def test_a_recording_that_lacks_any_one_signal_is_inspected(topic: str, virtual_recording: Path) -> None:
+    whole = read(virtual_recording)
+    for name in whole.columns[topic]:
+        fewer = {key: values for key, values in whole.columns[topic].items() if key != name}
+        run = replace(whole, columns=whole.columns | {topic: fewer})
+        summary = summarize(run)
+        inspect.write_report(summary)
+        assert verdict.sentences(run, summary)
+        if topic == "latency":
+            assert (summary["missed_ticks"] is None) == (name in ("seq", "command_sent_ns"))
+            assert (summary["late_ticks"] is None) == (name in ("seq", "deadline_missed"))
+
+
 def test_with_a_client_late_ticks_are_counted_by_cause(virtual_recording: Path, capsys: Any) -> None:
     run = read(virtual_recording)
     ticks = len(run.columns["master"]["t"])

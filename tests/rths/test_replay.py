@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from common.plan.read import load, with_test
 from common.reality.reality import as_planned
 from common.recording.reader import read
@@ -72,3 +74,34 @@ def test_ticks_held_before_the_first_command_to_several_slaves_are_replayed(tmp_
     matches = replay.replay_master(found, plan)
     assert found.columns["master"]["table_target"].shape == (50, 2)
     assert not any(match.differing for match in matches.values())
+
+
+@pytest.mark.parametrize("topic", ["master", "slave", "latency"])
+def test_a_recording_that_lacks_any_one_signal_is_replayed_as_far_as_it_goes(
+    topic: str, device: Path
+) -> None:
+    whole, other = read(device), str(DEVICE)
+    everything = replay.replay_master(whole, replay.planned(whole, other))
+    everything |= replay.replay_slaves(whole, replay.planned(whole, other))
+    needed = {"seq", "t", "piston_force_used"}
+    for name in whole.columns[topic]:
+        fewer = {key: values for key, values in whole.columns[topic].items() if key != name}
+        run = replace(whole, columns=whole.columns | {topic: fewer})
+        if topic == "master" and name in needed:
+            with pytest.raises(InputError, match=f"lack {name}"):
+                replay.planned(run, other)
+            continue
+        plan = replay.planned(run, other)
+        matches = replay.replay_master(run, plan) | replay.replay_slaves(run, plan)
+        assert matches.keys() == everything.keys()
+        assert not any(match.differing for match in matches.values())
+        if f"{topic}/{name}" in matches:
+            assert matches[f"{topic}/{name}"].compared == 0
+
+
+def test_what_was_not_recorded_is_said_not_to_be_compared(capsys: Any, device: Path) -> None:
+    run = read(device)
+    del run.columns["slave"]["piston_command"]
+    plan = replay.planned(run, str(DEVICE))
+    replay.show(replay.replay_slaves(run, plan), True)
+    assert "not recorded, and not compared: slave/piston_command" in capsys.readouterr().out
