@@ -21,6 +21,7 @@ from common.terminal.telling import Tell, untold
 from report.text.progress import Progress
 
 if TYPE_CHECKING:
+    from common.plan.plan import Plan
     from common.recording.run import Run
     from diagnosis.findings.for_prediction.as_reality import FoundReality
     from diagnosis.report.records import Report
@@ -40,7 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="further recordings of the same laboratories: one cause must explain all of them",
     )
     parser.add_argument(
-        "--plan", metavar="PLAN", help="what the laboratories should be (default: the plan in FILE)"
+        "--plan",
+        metavar="PLAN",
+        help="what the laboratories should be (default: the plan in FILE)",
     )
     parser.add_argument(
         "--ideal",
@@ -198,6 +201,16 @@ def diagnose_slaves(recording: Run, **options: Any) -> dict[str, Report]:
     return diagnosed(recording, **options)[0]
 
 
+def under(run: Run, plan: Plan | None, first: Run) -> Plan | None:
+    """The plan that a user gave, under the ground motion of a further recording that had another than the first."""
+    from report.facts.laboratories import whole_plan
+
+    own, other = whole_plan(first), whole_plan(run)
+    if plan is None or own is None or other is None or own.ground_motion == other.ground_motion:
+        return plan
+    return dataclasses.replace(plan, ground_motion=other.ground_motion)
+
+
 def diagnosed(
     recording: Run,
     *,
@@ -229,7 +242,7 @@ def diagnosed(
     believed = plans.load(cli.plan_path(plan)) if plan else None
     own, *others = (
         {
-            role: record.build(run, believed, against_ideal=against_ideal, role=role)
+            role: record.build(run, under(run, believed, recording), against_ideal=against_ideal, role=role)
             for role in run.roles or (MASTER,)
         }
         for run in (recording, *map(read, (*more, *validate)))

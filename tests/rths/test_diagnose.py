@@ -330,3 +330,21 @@ def test_an_effect_appears_in_a_recording_only_through_its_signals(cases: Cases)
     assert not any(word in content for word in (b"column.friction", b"link.delay", b"ImpairedLink", b"913.0"))
     changed = real.columns["master"]["column_force"] - clean.columns["master"]["column_force"]
     assert np.max(np.abs(changed)) > 500.0
+
+
+@pytest.mark.long
+def test_a_plan_that_is_given_keeps_the_motion_of_another_recording(
+    call: Any, cases: Cases, tmp_path: Path
+) -> None:
+    """Under the motion of the first recording half of the other one would be a gap."""
+    first, other = (
+        cases.file(FRICTION, duration=STRONGEST),
+        cases.file(FRICTION, duration=STRONGEST, scale=0.05),
+    )
+    gaps = []
+    for number, more in enumerate(([], ["--plan", "default"])):
+        out = tmp_path / f"{number}.json"
+        assert call("diagnose", first, "--validate", other, "--json", out, *more) == 0
+        gaps.append(checked(out)["how_far"])
+    assert gaps[1] == pytest.approx(gaps[0], rel=1e-6)
+    assert gaps[0]["after"] < 0.05
