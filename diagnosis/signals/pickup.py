@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from models.registry import Array
@@ -16,7 +17,9 @@ SLOWEST = 2.0  # Hz, below which a drift may look like one
 AROUND = 1.5  # Hz to each side over which the density beside a line is taken
 CHANCE = 1e-4  # of a line in noise without one
 MOST_LINES = 12
-PARTS = 6  # of the record, in which a line's amplitude is compared
+PARTS = 6  # of the record, in which a line's amplitude and phase are compared
+TURNED = 3  # times that a frequency is found by its phase
+WANDERS = 3  # degree of the polynomial that the phase of the mains follows
 STEADY = 0.35  # by which its amplitude may vary from the mean, relative; noise adds to that
 ALSO = 1e-3  # chance of a line in another reading, at the one frequency where it is looked for
 MAINS = (50.0, 60.0)  # Hz
@@ -28,6 +31,13 @@ class Pickup(NamedTuple):
 
     frequency: float  # Hz
     amplitude: float  # in the reading's unit
+    # Polynomial over time (s), highest power first, of the phase (rad) by which it wanders from such a frequency.
+    wander: tuple[float, ...] = ()
+
+    def phase(self, t: Array) -> Array:
+        """Its phase (n,) at times (n,) s, up to a constant, rad."""
+        turned = 2.0 * np.pi * self.frequency * t
+        return np.asarray(turned + np.polyval(self.wander, t) if self.wander else turned)
 
 
 class Spectrum(NamedTuple):
@@ -56,10 +66,10 @@ def pickups(residual: Array, interval: float, lowest: float = LOWEST) -> list[Pi
     for place in sorted(np.flatnonzero(peak & (places < power.size - 2)), key=lambda k: -power[k])[
         :MOST_LINES
     ]:
-        frequency = refined(power, int(place)) * line
-        amplitude = steady(residual, frequency, interval)
+        one = followed(residual, Pickup(refined(power, int(place)) * line, 0.0), interval)
+        amplitude = steady(residual, one, interval)
         if amplitude > 0.0:
-            found.append(Pickup(frequency, amplitude))
+            found.append(one._replace(amplitude=amplitude))
     return found
 
 
@@ -96,21 +106,52 @@ def refined(power: Array, place: int) -> float:
     return place + (0.5 * (a - c) / bend if bend < 0.0 else 0.0)
 
 
-def steady(residual: Array, frequency: float, interval: float) -> float:
+def followed(residual: Array, near: Pickup, interval: float) -> Pickup:
+    """A line of a residual (n,), by how its phase turns against one whose frequency is `near`.
+
+    A peak of a spectrum tells a frequency to a hundredth of the distance between two, by which the phase is off at the
+    ends of a record: of a line that is 500 times the noise, that is more than the noise. The frequency of the mains
+    wanders by some thousandths of a hertz within a record, that of a machine's controller does not.
+    """
+    middles = np.array([piece.mean() for piece in np.array_split(interval * np.arange(residual.size), PARTS)])
+    line = near
+    for _ in range(TURNED):
+        faster = float(turned(residual, line, interval, middles, 1)[0]) / (2.0 * math.pi)
+        line = line._replace(frequency=line.frequency + faster)
+    if of_mains(line.frequency):
+        for _ in range(TURNED):
+            further = turned(residual, line, interval, middles, WANDERS)
+            line = line._replace(wander=tuple(np.polyadd(line.wander or (0.0,), further).tolist()))
+    return line
+
+
+def turned(residual: Array, line: Pickup, interval: float, middles: Array, degree: int) -> Array:
+    """Polynomial (degree + 1,) over time (s), highest power first, of the phase (rad) of a residual (n,) over a line's.
+
+    `middles` (parts,) are the middles of the parts of the record, s.
+    """
+    parts = demodulated(residual, line, interval)
+    over = np.unwrap(np.angle(parts * np.conj(parts.sum())))
+    return np.asarray(np.polyfit(middles, over, degree, w=np.abs(parts)), dtype=np.float64)
+
+
+def demodulated(residual: Array, line: Pickup, interval: float) -> NDArray[np.complex128]:
+    """Amplitude and phase (parts,) of a residual (n,) over a line's phase, in the parts of the record."""
+    t = np.asarray(interval * np.arange(residual.size), dtype=np.float64)
+    wave = np.exp(-1j * line.phase(t))
+    return np.array([2.0 * np.mean(piece) for piece in np.array_split(residual * wave, PARTS)])
+
+
+def steady(residual: Array, line: Pickup, interval: float) -> float:
     """Amplitude of a line that is the same throughout a residual (n,), 0 where it comes and goes.
 
     Each part's amplitude and phase are held against those of the whole, with what noise makes them differ by.
     """
-    t = np.arange(residual.size) * interval
-    wave = np.exp(-2j * np.pi * frequency * t)
-    parts = np.array([2.0 * np.mean(piece) for piece in np.array_split(residual * wave, PARTS)])
-    neighbours = [
-        np.abs(2.0 * np.mean(piece))
-        for shift in (-AROUND, AROUND)
-        for piece in np.array_split(residual * np.exp(-2j * np.pi * (frequency + shift) * t), PARTS)
-    ]
+    parts = demodulated(residual, line, interval)
+    beside = [line._replace(frequency=line.frequency + shift) for shift in (-AROUND, AROUND)]
     mean = complex(np.mean(parts))
-    noise = 1.2 * float(np.median(neighbours))  # rms of a complex normal number over the median of its size
+    # rms of a complex normal number over the median of its size
+    noise = 1.2 * float(np.median([np.abs(demodulated(residual, one, interval)) for one in beside]))
     apart = np.abs(parts - mean)
     return abs(mean) if np.all(apart < STEADY * abs(mean) + 2.5 * noise) else 0.0
 
@@ -119,8 +160,8 @@ def waves(residual: Array, lines: Sequence[Pickup], interval: float) -> Array:
     """The lines' part (n,) of a residual (n,), by least squares over all lines at once."""
     if not lines:
         return np.zeros_like(residual)
-    t = np.arange(residual.size) * interval
-    columns = [shape(2.0 * np.pi * item.frequency * t) for item in lines for shape in (np.cos, np.sin)]
+    t = np.asarray(interval * np.arange(residual.size), dtype=np.float64)
+    columns = [shape(item.phase(t)) for item in lines for shape in (np.cos, np.sin)]
     x = np.column_stack(columns)
     return np.asarray(x @ np.linalg.lstsq(x, residual, rcond=None)[0])
 

@@ -128,6 +128,28 @@ def test_spectral_lines_of_constant_amplitude_count_as_pickup_and_those_of_a_mot
     assert pickup.pickups(white(9, TICKS) + 3.0 * burst, INTERVAL) == []
 
 
+@pytest.mark.parametrize(
+    ("frequency", "wanders", "times", "left"),
+    [
+        (49.983, 0.0, 500.0, 1.02),
+        (33.2147, 0.0, 500.0, 1.02),
+        (50.01, 0.01, 20.0, 1.1),
+        (60.0, 0.005, 50.0, 1.1),
+    ],
+)
+def test_loud_hum_is_taken_away_to_the_noise_though_no_line_of_a_spectrum_lies_on_it(
+    frequency: float, wanders: float, times: float, left: float
+) -> None:
+    t = np.arange(15_000) * INTERVAL
+    wandering = wanders * np.sin(2.0 * np.pi * t / 40.0)  # Hz
+    phase = 2.0 * np.pi * np.cumsum(frequency + wandering) * INTERVAL
+    reading = white(9, t.size) + times * np.sin(phase)
+    (found,) = pickup.pickups(reading, INTERVAL)
+    assert found.frequency == pytest.approx(frequency + wandering.mean(), abs=5e-3)
+    assert found.amplitude == pytest.approx(times, rel=0.02)
+    assert np.std(reading - pickup.waves(reading, [found], INTERVAL)) == pytest.approx(1.0, abs=left - 1.0)
+
+
 def test_lines_in_several_readings_count_as_motion_except_those_at_mains_frequency() -> None:
     t = np.arange(TICKS) * INTERVAL
     line, hum = np.sin(2.0 * np.pi * 12.4 * t), np.sin(2.0 * np.pi * 50.0 * t)
