@@ -12,9 +12,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy import ndimage
 
 from common.errors import InputError
+from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import PER_PERIOD, LoggedBuilding
+from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, Part
 from diagnosis.recorded.record import Record
 from diagnosis.signals import colour
@@ -33,7 +36,11 @@ BLOCK = 1.0  # s, of the blocks that are held out in turn: longer than a model's
 HELD_OUT = (2, 4)  # of every five blocks, these
 STEPPING = 2.0  # steps over the noise from which on a reading is rounded to more than its noise
 BELOW = 0.8  # rms of differences over what their median says, below which these are steps: noise has no less than one
-COARSE = 3.0  # steps that count as noise where a reading is rounded to more than its noise
+COARSE = 3.0  # steps that count as noise where a reading that is rounded to more than its noise rests on few of them
+WITHIN = 0.04  # s, within which the steps are counted that such a reading crosses
+# Averaged samples that a step lasts where a reading rests on it, and the share of the test in which no step may last so
+# long for what it errs by to count as noise of that size.
+LONGEST_STEP, MOVING = 5.0, 0.5
 SPARSE = 0.5  # of an averaged sample's ticks that must be there
 # Deviations beyond which a sample counts as this far out: of normal noise one sample in 5e8 is, and what impacts leave
 # in all signals counts as little. The rms of Student's t with four degrees of freedom is then found to 2 to 6 %, where
@@ -65,6 +72,7 @@ class Data:
     undoubted: Array | None = None  # (signals,) rms coloured noise of signals that hide no gap, 0 for others
     # (groups, signals) times the noise that an averaged sample behind an impact is known to; None where none is
     vague: Array | None = None
+    resting: Array | None = None  # the same beside a coarse step on which a reading rests
     erring: float = MODEL_ERROR  # share of a reading's rms that a good solution of the model may err by
     static: bool = False  # whether its rows have no times
 
@@ -222,7 +230,9 @@ class Data:
     def whitened(self, raw: Array) -> Array:
         """Residuals in σ (ticks, signals) averaged over groups and whitened, (groups, signals); `raw` may change."""
         result = self.coloured(raw)
-        return result if self.vague is None else result / self.vague[: len(result)]
+        for known in (self.vague, self.resting):
+            result = result if known is None else result / known[: len(result)]
+        return result
 
     def coloured(self, raw: Array) -> Array:
         """The same where all that was recorded counts alike."""
@@ -305,7 +315,7 @@ def by_tick(data: Data) -> Data:
     """The residuals of a part without averages, for what changes from tick to tick."""
     train = np.repeat(data.train, data.group)
     rest = np.full(len(data.part.measured) - train.size, train[-1])
-    return replace(data, group=1, train=np.concatenate([train, rest]), vague=None)
+    return measured_by(replace(data, group=1, train=np.concatenate([train, rest]), vague=None), data.white)
 
 
 def withheld_ticks(ticks: int, interval: float) -> Mask:
@@ -317,12 +327,42 @@ def withheld_ticks(ticks: int, interval: float) -> Mask:
 
 
 def measured_by(data: Data, white: Array) -> Data:
-    """The data with residuals in units of a noise (signals,)."""
+    """The data with residuals in units of a noise (signals,).
+
+    A reading that moves over coarse steps errs by a twelfth of their square, as by white noise. One that rests on a few
+    of them errs by as much, and by the same for long.
+    """
     least = (EXACT if data.part.exact else data.erring) * data.part.level + 1e-15
-    rounding = np.where(
-        data.rounded > STEPPING * white, COARSE * data.rounded, data.rounded / math.sqrt(12.0)
-    )
-    return replace(data, sigma=np.sqrt(white**2 + least**2 + rounding**2), white=white)
+    coarse = np.flatnonzero(data.rounded > STEPPING * white)
+    lasting = {int(place): steps_last(data, int(place)) for place in coarse}
+    still = [place for place, groups in lasting.items() if np.mean(groups > LONGEST_STEP) > 1.0 - MOVING]
+    moving = [place for place in lasting if place not in still]
+    rounding = data.rounded / math.sqrt(12.0)
+    known = np.ones((data.groups, white.size))
+    heard = white**2 + rounding**2
+    heard[still] = white[still] ** 2 + (COARSE * data.rounded[still]) ** 2
+    heard[moving] = np.maximum(white, rounding)[moving] ** 2  # what a moving reading errs by is in its noise
+    sigma = np.sqrt(heard + least**2)
+    for place in moving:
+        more = (rounding[place] / sigma[place]) ** 2
+        known[:, place] = np.sqrt(1.0 + (lasting[place] - 1.0) * more)
+    return replace(data, sigma=sigma, white=white, resting=known if moving else None)
+
+
+def steps_last(data: Data, place: int) -> Array:
+    """How many averaged samples a step of a reading lasts, (groups,), one at least.
+
+    The step of a balance, or of a ground motion between rows, is no reading's and stands for an error that lasts.
+    """
+    most = 12.0 * COARSE**2
+    if isinstance(data.part, Building | Ground):
+        return np.full(data.groups, most)
+    interval = data.system.plan.test.interval
+    size = 2 * max(1, round(0.5 * WITHIN / interval)) + 1
+    reading = data.part.measured[: data.groups * data.group, place]
+    spans = ndimage.maximum_filter1d(reading, size) - ndimage.minimum_filter1d(reading, size)
+    crossed = data.averaged(spans) / (math.sqrt(data.group) * data.rounded[place])
+    return np.clip(WITHIN / (interval * data.group) / np.maximum(crossed, 1e-9), 1.0, most)
 
 
 def noise(residual: Array) -> Array:

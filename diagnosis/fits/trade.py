@@ -34,6 +34,7 @@ NEARING = 0.5
 # be found in its place. Where the best effect of all leaves more, nothing of the catalogue alone is near the cause.
 FOLLOWED = 0.5
 TRIED = 3  # candidates that are fitted in such a place: they must come close at once
+OF_FORMULA = 0.25  # of the most that two good solutions of one model differ by: what they differ by as a rule
 REFITTED = 8  # steps over all seconds of hypotheses that leave as much of those seen
 PULLED = 3.84  # of Σ z²: a single effect that truly is none brings back as much in one of twenty cases (χ²)
 
@@ -49,14 +50,14 @@ def tied(chosen: Fit, other: Fit) -> bool:
 
 
 def plainer(fit: Fit, other: Fit) -> bool:
-    """Whether a fit with fewer free parameters than another one does the same to what good solutions differ by.
+    """Whether a fit with fewer free parameters than another one does the same to what formulas of one law differ by.
 
-    So small a difference, which nobody could see, is no reason for a further parameter: it may come from the formula.
+    So small a difference, which nobody could see, is no reason for a further parameter.
     """
     if freedom(fit)[0] >= freedom(other)[0] or (leaves(fit) and not leaves(other)):
         return False
     apart = np.sqrt(np.mean(np.square(fit.reduced - other.reduced), axis=0) / fit.data.group)
-    return bool(np.all(apart <= np.minimum(MATERIAL, model_error(other))))
+    return bool(np.all(apart <= np.minimum(MATERIAL, OF_FORMULA * model_error(other))))
 
 
 def on_all(fit: Fit, others: Sequence[Fit]) -> tuple[Fit, list[Fit]]:

@@ -48,7 +48,7 @@ def test_of_fits_that_the_data_cannot_tell_from_the_best_the_search_goes_on_with
 def test_a_further_parameter_needs_more_than_good_solutions_differ_by_and_than_anybody_could_see(
     monkeypatch: pytest.MonkeyPatch, moved: float, error: float, same: bool
 ) -> None:
-    monkeypatch.setattr(trade, "model_error", lambda item: np.full(item.data.sigma.size, error))
+    monkeypatch.setattr(trade, "model_error", lambda item: np.full(item.data.sigma.size, 4.0 * error))
     step = moved * np.sqrt(DATA.group)
     two, one = fit(SIDED), fit({"damper.friction": COULOMB}, step)
     assert not tied(two, one)
