@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,19 +53,21 @@ def run(args: argparse.Namespace) -> int:
     outputs.checked(args.output, args.force, inputs)
     with Progress("importing"):
         from report.text import tabular
+        from rths.examine.importing.beginning import begun
         from rths.examine.importing.import_map import load_map
         from rths.examine.importing.onto_ticks import on_ticks
         from rths.examine.importing.time_base import put_together
 
-        mapping = load_map(args.map)
-        table = put_together(mapping, tabular.read_table(args.data, mapping.form), args.data)
+        stated = load_map(args.map)
+        table = put_together(stated, tabular.read_table(args.data, stated.form), args.data)
+        mapping = begun(stated, table, args.data)
         found = on_ticks(mapping, table, args.data, as_is=args.as_is)
         ground, unread = ground_of(mapping, found)
         with outputs.writing(args.output, args.force, inputs) as path:
             write(path, mapping, found, args.data.name, ground, as_is=args.as_is)
             if not args.as_is:
                 check_slips(path, args.data)
-    show(args, mapping, found, table.form, unread)
+    show(args, mapping, found, table.form, unread, mapping.start if stated.start is None else None)
     return 0
 
 
@@ -86,11 +89,17 @@ def plan_of(mapping: ImportMap, found: OnTicks) -> Plan:
 
 
 def show(
-    args: argparse.Namespace, mapping: ImportMap, found: OnTicks, form: TextForm | None, unread: str
+    args: argparse.Namespace,
+    mapping: ImportMap,
+    found: OnTicks,
+    form: TextForm | None,
+    unread: str,
+    begins: float | None,
 ) -> None:
     """Say what was written and read, which signals are absent or interpolated, and what can be judged.
 
-    `unread` says why the plan's ground motion could not be read, if so.
+    `unread` says why the plan's ground motion could not be read, if so; `begins` is the time (s, of the data) at which
+    the test was found to begin.
     """
     from rths.examine.importing.import_map import lab_signals
 
@@ -107,6 +116,7 @@ def show(
             "units": found.units,
             "gaps": found.gaps,
             "ends": found.ends,
+            "start": begins,
             "ground_unread": unread,
             "text": form and form._asdict(),
         }
@@ -125,23 +135,27 @@ def show(
         say(f"units, from the row below the names or from brackets in them: {', '.join(units)}\n")
     if found.interpolated:
         say(f"interpolated onto the ticks, and marked so: {', '.join(found.interpolated)}\n")
-    if found.clock and found.clock.between:
-        say(f"{found.clock.told}\n")
-    if any(found.ends):
-        before, behind = found.ends
-        say(
-            f"left out, as not all columns have begun or go on there: {before} rows at the begin, {behind} at the end\n"
-        )
-    if found.gaps:
-        begin, end = max(found.gaps, key=lambda gap: gap[1] - gap[0])
-        more = f", and in {len(found.gaps) - 1} shorter gaps" if found.gaps[1:] else ""
-        say(
-            f"no rows from {begin:.6g} to {end:.6g} s{more}: straight lines stand there, which a diagnosis leaves out\n"
-        )
+    for line in said_of_time(found, begins):
+        say(f"{line}\n")
     if unread:
         say(f"ground: the whole test cannot be simulated from this recording: {unread}\n")
     if mapping.plan.roles and not (judged or mapping.static):
         say(f"link: {UNJUDGED}\n")
+
+
+def said_of_time(found: OnTicks, begins: float | None) -> Iterator[str]:
+    """What was found about the data's time: when the test begins (s, of the data), its clock, and rows that lack."""
+    if begins is not None:
+        yield f"start: the plan's ground motion begins at {begins:.6g} s of the data; what lies before is left out"
+    if found.clock and found.clock.between:
+        yield found.clock.told
+    if any(found.ends):
+        before, behind = found.ends
+        yield f"left out, as not all columns have begun or go on there: {before} rows at the begin, {behind} at the end"
+    if found.gaps:
+        begin, end = max(found.gaps, key=lambda gap: gap[1] - gap[0])
+        more = f", and in {len(found.gaps) - 1} shorter gaps" if found.gaps[1:] else ""
+        yield f"no rows from {begin:.6g} to {end:.6g} s{more}: straight lines stand there, which a diagnosis leaves out"
 
 
 def exchange(mapping: ImportMap) -> bool:

@@ -1,0 +1,74 @@
+"""The beginning of a test in data that began before it, found by the ground motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models.registry import Array
+from rths.examine.importing.beginning import first_tick, ticks_before
+from tests.rths.imports import PLAN, TIMES, table
+
+INTERVAL = 0.01  # s, of the plan
+MOTION = "[ground_motion]\nrecord = 'motion.csv'\nscale = 1.0\n"
+COLUMNS = 'ground_acceleration = { column = "a" }\ndisplacement = { column = "x", unit = "mm" }\n'
+
+
+def shaking(t: Any) -> Array:
+    """A ground acceleration (n,) in m/s² that begins at 0 s and has no period."""
+    return np.where((t >= 0.0) & (t < 3.5), np.sin(2.0 * np.pi * (1.0 + 0.3 * t) * t) * np.exp(-0.3 * t), 0.0)
+
+
+def drift(t: Any) -> Array:
+    """A displacement (n,) in mm that begins at 0 s."""
+    return np.where(t > 0.0, 5.0 * (1.0 - np.cos(2.0 * np.pi * 0.7 * t)), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("rate", "before", "held"),
+    [(100.0, 1.57, True), (200.0, 1.57, True), (217.0, 1.5703, True), (100.0, 1.57, False), (0.0, 0.0, True)],
+)
+def test_a_test_begins_where_its_ground_motion_does(
+    rate: float, before: float, held: bool, bring: Any, capsys: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "motion.csv").write_text(table("time (s),acceleration (m/s2)", TIMES, shaking(TIMES)))
+    rate = rate or 100.0
+    t = np.asarray(np.arange(round((before + 3.9) * rate)) / rate - before, dtype=np.float64)
+    ticks = np.asarray(INTERVAL * np.floor(t / INTERVAL + 1e-6), dtype=np.float64)
+    data = table("t,a,x", t + before, 1.01 * shaking(ticks if held else t), drift(ticks))
+    code, run = bring(data, COLUMNS, plan=PLAN + MOTION)
+    assert code == 0
+    found = run.columns["master"]
+    when = found["t"][:-4]
+    assert found["displacement"][:-4] == pytest.approx(1e-3 * drift(when), abs=2e-5)
+    assert ("start: the plan's ground motion begins at 1.57" in capsys.readouterr().out) == (before > 0.0)
+
+
+def test_a_start_that_the_map_states_is_taken(bring: Any, capsys: Any, tmp_path: Path) -> None:
+    (tmp_path / "motion.csv").write_text(table("time (s),acceleration (m/s2)", TIMES, shaking(TIMES)))
+    t = np.asarray(INTERVAL * np.arange(500) - 1.0, dtype=np.float64)
+    data = table("t,a,x", t + 1.0, shaking(t), drift(t))
+    code, run = bring(data, COLUMNS, 'time = "t"\nstart = 0.5\n', plan=PLAN + MOTION)
+    assert code == 0
+    assert run.columns["master"]["t"].size == 450
+    assert "start: " not in capsys.readouterr().out
+
+
+def test_another_motion_has_no_beginning() -> None:
+    noise = np.random.default_rng(5).standard_normal((2, 4000))
+    assert ticks_before(noise[0], noise[1, :2000]) == 0
+    assert ticks_before(np.zeros(4000), noise[1]) == 0
+    assert ticks_before(np.concatenate([np.zeros(700), noise[0]]), noise[0]) == 700
+
+
+@pytest.mark.parametrize("off", [0.0, 0.0031, 0.0069])
+def test_the_first_tick_of_a_reading_on_straight_lines_lies_between_rows(off: float) -> None:
+    times = np.arange(900) / 173.0
+    begin = 1.2 + off
+    planned = shaking(TIMES[:350])
+    reading = np.interp(times - begin, TIMES[:350], planned)
+    found = first_tick(times, reading, planned, 1.21, INTERVAL)
+    assert found == pytest.approx(begin, abs=INTERVAL / 8.0)
