@@ -115,11 +115,12 @@ def promised(near: Fit, scales: Scales) -> list[ScreenedEffect]:
 
 
 def with_stop(fit: Fit, fits: list[Fit]) -> list[Fit]:
-    """The fits, and one with an end stop where all the others leave a large residual."""
+    """The fits, and one with an end stop where all the others leave something."""
     stops = [effect for effect in fit.data.part.candidates if effect.contact]
-    if not fits or not stops or remaining(fits[0]) < LOUD or stops[0].name in fit.names:
+    if not fits or not stops or stops[0].name in fit.names or not leaves(fits[0]):
         return fits
-    found = contact.stopped(fit.data, fit, stops[0])
+    loud = remaining(fits[0]) > LOUD
+    found = (contact.stopped if loud else contact.touched)(fit.data, fit, stops[0])
     rest = [item for item in fits if stops[0].name not in item.names]
     if found is None or found.cost > min(item.cost for item in fits):
         return fits

@@ -2,7 +2,8 @@
 
 The first residual tells when the stop was first met, and the largest stroke until then where it stands; from there the
 fit is lengthened bit by bit, each piece starting from the parameters of the shorter one. Under a further law only that
-stiffness is lengthened which fits best shortly after the first contact.
+stiffness is lengthened which fits best shortly after the first contact. A stop that is met so lightly that the gap is
+small sends no prediction elsewhere, and is fitted at once.
 """
 
 from __future__ import annotations
@@ -23,11 +24,37 @@ from models.registry import Array
 
 FIRST = 0.02  # of the largest residual, from which on the stop has been met
 INSIDE = (0.97, 0.7)  # of the largest stroke before that, where a stiff and a soft stop may stand
+LIGHTLY = (0.99, 0.96, 0.9, 0.8)  # of the largest stroke, where a stop may stand that is met lightly
+NEAREST = 3  # of the starts of such a stop, those that are fitted
 AFTER = 0.4  # s after first contact that the shortest fit covers
 LONGER = 1.3  # factor from one fit to the next
 # Times the stroke before that: no motion that meets a stop goes so far, not even an unstable one.
 BEYOND = 30.0
 EVERY = 5  # of so many averaged samples one judges
+
+
+def touched(data: Data, fit: Fit, effect: Effect) -> Fit | None:
+    """The fit with an end stop as well that is met lightly, so that no fit need grow; None without a recorded motion.
+
+    The stop stands near the largest stroke, and is fitted from where it leaves least.
+    """
+    stop = effect.contact
+    if stop is None or stop.motion not in data.part.signals:
+        return None
+    place = data.part.signals.index(stop.motion)
+    there = data.part.present[:, place]
+    if not there.any():
+        return None
+    reached = float(np.max(np.abs(data.part.measured[there, place])))
+    starts = [
+        effect.under(law, {stop.place: share * reached, stop.stiffness: stiffness})
+        for law in range(len(effect.laws))
+        for share in LIGHTLY
+        for stiffness in stop.starts
+    ]
+    laid = each(lambda values: fitting.at(data, {**fit.values, effect.name: values}, fit.z), starts)
+    nearest = sorted(laid, key=cost)[:NEAREST]
+    return min(each(lambda item: fitting.fit(data, item.values, item.z), nearest), key=cost)
 
 
 def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:

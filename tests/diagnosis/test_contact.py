@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
+import pytest
 
-from diagnosis.fits.contact import by_law
+from diagnosis.fits import fitting, residuals
+from diagnosis.fits.contact import by_law, touched
 from models.registry import Array
+from tests.diagnosis.cases import Cases, estimate, lab_b, named
 
 
 @dataclass(frozen=True)
@@ -26,3 +29,22 @@ def test_two_starts_that_end_at_the_same_stop_are_told_apart_by_their_law_alone(
     springs, others = by_law(cast(Any, fits), "stop")
     assert [id(one) for one in springs] == [id(one) for one in fits[:2]]
     assert [id(one) for one in others] == [id(fits[2])]
+
+
+@pytest.mark.long
+def test_a_stop_that_is_met_lightly_is_found(cases: Cases) -> None:
+    largest = float(np.abs(cases.record(duration=12.0).signals["damper_stroke"]).max())
+    place = round(0.985 * largest, 5)
+    report = cases.report({"damper.stroke_stop": {"stroke": place, "stiffness": 600.0}}, duration=12.0)
+    assert named(report) == ["damper.stroke_stop"]
+    assert report["status"] == "explained"
+    assert estimate(report, "damper.stroke_stop", "stroke") == pytest.approx(place, rel=0.02)
+
+
+def test_without_a_motion_that_was_recorded_there_is_no_stop(cases: Cases) -> None:
+    record = cases.record()
+    data = residuals.prepare(lab_b(record), record)
+    part = data.part.first(data.groups * data.group)
+    part.present = np.zeros_like(part.present)
+    bare = fitting.at(replace(data, part=part), {}, np.zeros(len(part.nuisances)))
+    assert touched(bare.data, bare, data.catalogue["damper.stroke_stop"]) is None
