@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from common.recording.run import Run
 
 IMPORT = "import"  # metadata of an imported recording
+REST = "at_rest"  # attachment of readings from before the test
 # The low-pass filters usual before the converters of data loggers, those with a ripple in what they pass last.
 FILTERS = ("butterworth", "bessel", "chebyshev", "elliptic")
 RIPPLING = FILTERS[2:]
@@ -170,6 +171,9 @@ class ImportedData:
     channels: Mapping[str, Mapping[str, ImportedChannel]] = field(default_factory=dict)
     as_is: bool = False  # units and signs are not checked for plausibility, at the user's request
     gaps: tuple[tuple[float, float], ...] = ()  # s of the test, between which rows are missing
+    rest: tuple[
+        tuple[str, str], ...
+    ] = ()  # topics and names of the readings that are kept from before the test
 
     def channel(self, topic: str, name: str) -> ImportedChannel:
         """What is stated about a signal; `NOTHING_STATED` for one that the map does not name."""
@@ -200,7 +204,8 @@ class ImportedData:
         }
         flags = {"static": json.dumps(self.static), "as_is": json.dumps(self.as_is)}
         gaps = {"gaps": json.dumps(self.gaps)} if self.gaps else {}
-        return {"data": self.data, **flags, **gaps, "channels": json.dumps(tables)}
+        rest = {REST: json.dumps(self.rest)} if self.rest else {}
+        return {"data": self.data, **flags, **gaps, **rest, "channels": json.dumps(tables)}
 
 
 def is_static(run: Run) -> bool:
@@ -224,11 +229,20 @@ def imported(run: Run) -> ImportedData | None:
         }
         static, as_is = (json.loads(values.get(name, "false")) for name in ("static", "as_is"))
         gaps = tuple((float(begin), float(end)) for begin, end in json.loads(values.get("gaps", "[]")))
-        return ImportedData(values.get("data", ""), bool(static), channels, bool(as_is), gaps)
+        rest = tuple((str(topic), str(name)) for topic, name in json.loads(values.get(REST, "[]")))
+        return ImportedData(values.get("data", ""), bool(static), channels, bool(as_is), gaps, rest)
     except (ValueError, TypeError, AttributeError):
         raise InputError(
             f"{run.path} is damaged: its metadata '{IMPORT}' cannot be read; import the data again."
         ) from None
+
+
+def at_rest(run: Run) -> dict[tuple[str, str], Samples]:
+    """Readings (ticks,) at the interval of the test from before it, by topic and name; empty where none are kept."""
+    stated = imported(run)
+    names = stated.rest if stated is not None and REST in run.attachments else ()
+    values = np.frombuffer(run.attachments[REST], dtype="<f8").reshape(len(names), -1) if names else ()
+    return dict(zip(names, values, strict=True))
 
 
 def past_high_pass(values: Samples, interval: float, corner: float) -> Samples:

@@ -38,14 +38,11 @@ REST = 2e-3  # of the largest motion of a window, below which it is at rest
 QUIET = 0.1  # below which it is quiet
 ENOUGH = 5.0  # s of quiet windows that suffice
 SHARE = 0.35  # of the windows, the quietest, where fewer than `ENOUGH` seconds are quiet
-SLACK = 0.06  # by which the variance of white noise may differ from that at the highest frequencies
 SURE = 4.0  # standard errors beyond which noise follows the motion
-# Standard errors beyond which noise is not white: fewer than those of a gap, as unseen colour looks like one.
-WHITE = 3.0
-SLOWER = (1, 4, 16)  # averaged samples in the sums by which that is decided
 # Motion elsewhere over that of the quiet part, from which on noise that is as loud in both does not follow it.
 VARIED = 2.0
 LEAST = 4.0  # s of a recording without which no flexible model is asked
+AS_LOUD = 1.3  # of the noise at the highest frequencies before a test, up to which it is that of the test
 LOWER = 0.9  # of the noise first found, from which on a lower one is believed
 
 
@@ -321,18 +318,49 @@ def model(data: Data, rest: Remainder, part: QuietPart, place: int) -> NoiseMode
     smooth = data.static and source != "at rest"  # what changes slowly is the error of a law
     if stepping or smooth or not segments or not np.any(rest.noise[:, place]):
         return NoiseModel(flat, lines=lines, resolution=resolution)
+    if (known := before_the_test(data, place)) is not None:
+        return replace(known, lines=lines, resolution=resolution)
     if alike(rest.noise[:, place], quiet):
         quiet, source, steady = np.ones_like(quiet), "residual", part.varied > VARIED
         segments = stretches(rest.noise[:, place], quiet)
-    if is_white(segments, flat, resolution):
+    if colour.is_white(segments, flat, resolution):
         return NoiseModel(flat, lines=lines, resolution=resolution)
     segments = [piece - piece.mean() for piece in segments]
     density, order = colour.density(segments)
     samples = sum(piece.size for piece in segments)
     rms = float(rest.single[:, place][np.repeat(quiet, data.group)].std())
     gains = colour.gains(density + data.beside[place], data.groups)[:, None]
-    tails = heaviness(colour.whitened(rest.noise[:, [place]], gains)[quiet, 0])
+    tails = colour.heaviness(colour.whitened(rest.noise[:, [place]], gains)[quiet, 0])
     return NoiseModel(rms, "ar", order, source, lines, resolution, density, samples, tails, steady)
+
+
+def before_the_test(data: Data, place: int) -> NoiseModel | None:
+    """The noise of one signal by its readings at rest before the test, None where none are kept.
+
+    It is none either where the sensor is far louder or quieter in the test at its highest frequencies: a pump that
+    did not run, or a converter whose noise lies below its step.
+    """
+    kept = data.part.rest[place] if isinstance(data.part, LaboratoryPart) else None
+    flat, interval = float(data.white[place]), data.system.plan.test.interval
+    groups = 0 if kept is None else kept.size // data.group
+    if kept is None or groups < 2 * colour.SEGMENT:
+        return None
+    still = kept - kept.mean()
+    still = still - pickup.waves(still, pickup.pickups(still, interval), interval)
+    every = np.zeros((still.size, data.white.size))
+    every[:, place] = still
+    level = float(data.white_part(every)[place])
+    if not flat < AS_LOUD * level < AS_LOUD**2 * flat:
+        return None
+    averaged = still[: groups * data.group].reshape(groups, data.group).sum(axis=1) / math.sqrt(data.group)
+    if colour.is_white([averaged], flat, float(data.rounded[place])):
+        return NoiseModel(flat, source="at rest")
+    density, order = colour.density([averaged])
+    gains = colour.gains(density + data.beside[place], groups)[:, None]
+    tails = colour.heaviness(colour.whitened(averaged[:, None], gains)[:, 0])
+    return NoiseModel(
+        float(still.std()), "ar", order, "at rest", density=density, samples=groups, tails=tails
+    )
 
 
 def alike(noise: Array, quiet: Mask) -> bool:
@@ -343,22 +371,16 @@ def alike(noise: Array, quiet: Mask) -> bool:
     """
     whole = colour.density([noise - noise.mean()])[0]
     white = colour.whitened(noise[:, None], colour.gains(whole, noise.size)[:, None])[:, 0]
-    for size in SLOWER:
-        still, loud = (summed(stretches(white, mask), size) for mask in (quiet, ~quiet))
+    for size in colour.SLOWER:
+        still, loud = (colour.summed(stretches(white, mask), size) for mask in (quiet, ~quiet))
         if min(still.size, loud.size) < 8:
             continue
         more = float(np.var(loud)) / max(float(np.var(still)), 1e-300) - 1.0
-        sums = summed([white], size)
+        sums = colour.summed([white], size)
         one = 2.0 * samples_per_sample(sums - sums.mean())
         if more > SURE * math.sqrt(one / still.size + one / loud.size):
             return False
     return True
-
-
-def summed(segments: list[Array], size: int) -> Array:
-    """Sums of noise over so many averaged samples, scaled so that white noise keeps its rms."""
-    sums = [piece[: piece.size // size * size].reshape(-1, size).sum(axis=1) for piece in segments]
-    return np.concatenate([np.zeros(0), *sums]) / math.sqrt(size)
 
 
 def stretches(noise: Array, quiet: Mask) -> list[Array]:
@@ -366,23 +388,3 @@ def stretches(noise: Array, quiet: Mask) -> list[Array]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], quiet, [False]]).astype(np.int8)))
     pieces = [noise[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
     return [piece for piece in pieces if piece.size >= colour.SEGMENT]
-
-
-def is_white(segments: list[Array], rms: float, resolution: float) -> bool:
-    """Whether sums over a few averaged samples have the variance of white noise of an rms."""
-    variance = rms**2 + resolution**2 / 12.0
-    for size in SLOWER:
-        every = summed(segments, size)
-        if every.size < 8:
-            continue
-        spread = float(np.mean((every - np.median(every)) ** 2)) / max(variance, 1e-300) - 1.0
-        if abs(spread) > SLACK + WHITE * math.sqrt(2.0 / every.size):
-            return False
-    return True
-
-
-def heaviness(noise: Array) -> float:
-    """How much more the energy of whitened noise (n,) varies than that of normal noise, from its fourth moment."""
-    variance = float(np.mean(noise**2))
-    kurtosis = float(np.mean(noise**4)) / variance**2 if variance > 0.0 else 3.0
-    return math.sqrt(max(1.0, (kurtosis - 1.0) / 2.0))

@@ -14,6 +14,7 @@ import numpy as np
 
 from common.plan.kinds import COLUMN
 from common.plan.plan import Plan
+from common.recording.imported import at_rest
 from diagnosis.recorded.commands import followed
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import (
@@ -163,6 +164,8 @@ class LaboratoryPart:
         seen = [machine for machine in machines if self.shows(record, machine)]
         names = tuple(name for machine in seen for name in machine.parameters)
         self.channels = channels(record.stated, lab)
+        kept = at_rest(record.run)
+        self.rest = tuple(kept.get((lab.role, channel)) for channel in lab.kind.channels.names)
         self.misses: dict[tuple[float | None, ...], Array] = {}  # what `missed` gives
         interval = record.plan.test.interval
         sampled = [one.interpolated or one.rate * interval > OWN_RATE for one in self.channels]

@@ -19,6 +19,10 @@ GRID: Array = np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 400)])  # shares of
 MOST = 16  # order of a model: 0.13 s of averaged samples, longer than a filter of a sensor remembers
 SLOW, SLOW_MOST = 16, 3  # averaged samples in a slow sample, order of the model of those
 SLOW_LEAST = 24  # fewest slow samples from which slow noise is judged
+SLACK = 0.06  # by which the variance of white noise may differ from that at the highest frequencies
+# Standard errors beyond which noise is not white: fewer than those of a gap, as unseen colour looks like one.
+WHITE = 3.0
+SLOWER = (1, 4, 16)  # averaged samples in the sums by which that is decided
 SEGMENT = 24  # samples that a segment must have
 TAIL = 3.5  # standard deviations beyond which an innovation counts as one of the tail
 # Samples at each end that mirroring changes, and deviations that these may have, as one normal number in 370 has. Noise
@@ -155,3 +159,29 @@ def whitened(x: Array, factors: Array) -> Array:
     ends = np.ix_(np.r_[: min(ENDS, len(x)), max(0, len(x) - ENDS) : len(x)], np.ptp(factors, axis=0) > 0.0)
     result[ends] = np.clip(result[ends], -LAST, LAST)
     return result
+
+
+def summed(segments: list[Array], size: int) -> Array:
+    """Sums of noise over so many averaged samples, scaled so that white noise keeps its rms."""
+    sums = [piece[: piece.size // size * size].reshape(-1, size).sum(axis=1) for piece in segments]
+    return np.concatenate([np.zeros(0), *sums]) / math.sqrt(size)
+
+
+def is_white(segments: list[Array], rms: float, resolution: float) -> bool:
+    """Whether sums over a few averaged samples have the variance of white noise of an rms."""
+    variance = rms**2 + resolution**2 / 12.0
+    for size in SLOWER:
+        every = summed(segments, size)
+        if every.size < 8:
+            continue
+        spread = float(np.mean((every - np.median(every)) ** 2)) / max(variance, 1e-300) - 1.0
+        if abs(spread) > SLACK + WHITE * math.sqrt(2.0 / every.size):
+            return False
+    return True
+
+
+def heaviness(noise: Array) -> float:
+    """How much more the energy of whitened noise (n,) varies than that of normal noise, from its fourth moment."""
+    variance = float(np.mean(noise**2))
+    kurtosis = float(np.mean(noise**4)) / variance**2 if variance > 0.0 else 3.0
+    return math.sqrt(max(1.0, (kurtosis - 1.0) / 2.0))

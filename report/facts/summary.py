@@ -282,7 +282,9 @@ def ticks_where(run: Run, name: str, condition: Callable[[Values], Values]) -> i
     tables = lateness.exchanges(run, "seq", name)
     if not any(columns["seq"].size for columns in tables):
         return None
-    return int(np.unique(np.concatenate([columns["seq"][condition(columns[name])] for columns in tables])).size)
+    return int(
+        np.unique(np.concatenate([columns["seq"][condition(columns[name])] for columns in tables])).size
+    )
 
 
 def latencies(run: Run) -> dict[str, Any]:

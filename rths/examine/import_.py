@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from common import signals
 from common.errors import InputError
@@ -20,6 +21,7 @@ from report.text.text_form import TextForm
 
 if TYPE_CHECKING:
     from common.plan.plan import Plan
+    from models.registry import Array
     from recorder.files import MotionRows
     from rths.examine.importing.import_map import ImportMap, Known
     from rths.examine.importing.onto_ticks import OnTicks
@@ -56,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
         from rths.examine.importing.beginning import begun
         from rths.examine.importing.import_map import load_map
         from rths.examine.importing.onto_ticks import on_ticks
+        from rths.examine.importing.rest import readings_at_rest
         from rths.examine.importing.time_base import put_together
 
         stated = load_map(args.map)
@@ -63,11 +66,13 @@ def run(args: argparse.Namespace) -> int:
         mapping = begun(stated, table, args.data)
         found = on_ticks(mapping, table, args.data, as_is=args.as_is)
         ground, unread = ground_of(mapping, found)
+        rest = readings_at_rest(mapping, table, args.data, found)
         with outputs.writing(args.output, args.force, inputs) as path:
-            write(path, mapping, found, args.data.name, ground, as_is=args.as_is)
+            write(path, mapping, found, args.data.name, ground, rest, as_is=args.as_is)
             if not args.as_is:
                 check_slips(path, args.data)
-    show(args, mapping, found, table.form, unread, mapping.start if stated.start is None else None)
+    told = Told(table.form, unread, mapping.start if stated.start is None else None, rest)
+    show(args, mapping, found, told)
     return 0
 
 
@@ -88,19 +93,17 @@ def plan_of(mapping: ImportMap, found: OnTicks) -> Plan:
     return with_test(mapping.plan, duration=found.t.size * mapping.plan.test.interval)
 
 
-def show(
-    args: argparse.Namespace,
-    mapping: ImportMap,
-    found: OnTicks,
-    form: TextForm | None,
-    unread: str,
-    begins: float | None,
-) -> None:
-    """Say what was written and read, which signals are absent or interpolated, and what can be judged.
+class Told(NamedTuple):
+    """What is told of an import beside its signals."""
 
-    `unread` says why the plan's ground motion could not be read, if so; `begins` is the time (s, of the data) at which
-    the test was found to begin.
-    """
+    form: TextForm | None  # of a text file
+    unread: str  # why the plan's ground motion could not be read, empty where it was
+    begins: float | None  # s of the data, at which the test was found to begin
+    rest: Mapping[str, Array]  # readings (ticks,) from before the test
+
+
+def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: Told) -> None:
+    """Say what was written and read, which signals are absent or interpolated, and what can be judged."""
     from rths.examine.importing.import_map import lab_signals
 
     known, present = lab_signals(mapping.plan), list(found.values)
@@ -116,16 +119,17 @@ def show(
             "units": found.units,
             "gaps": found.gaps,
             "ends": found.ends,
-            "start": begins,
-            "ground_unread": unread,
-            "text": form and form._asdict(),
+            "start": told.begins,
+            "at_rest": [*told.rest],
+            "ground_unread": told.unread,
+            "text": told.form and told.form._asdict(),
         }
         say(json.dumps(report) + "\n")
         return
     rows = "rows without times" if mapping.static else f"ticks of {mapping.plan.test.interval:g} s"
     say(f"{args.output}: {found.t.size} {rows}; signals: {', '.join(present)}\n")
     say(f"absent: {', '.join(absent) or 'none'}\n")
-    if form and form != TextForm():
+    if (form := told.form) and form != TextForm():
         between = {"\t": "tabs", " ": "spaces"}.get(form.separator, f"'{form.separator}'")
         say(
             f"text: {between} between columns, decimal sign '{form.decimal}', {form.skip_rows} rows above the names\n"
@@ -135,18 +139,20 @@ def show(
         say(f"units, from the row below the names or from brackets in them: {', '.join(units)}\n")
     if found.interpolated:
         say(f"interpolated onto the ticks, and marked so: {', '.join(found.interpolated)}\n")
-    for line in said_of_time(found, begins):
+    for line in said_of_time(found, told):
         say(f"{line}\n")
-    if unread:
-        say(f"ground: the whole test cannot be simulated from this recording: {unread}\n")
+    if told.unread:
+        say(f"ground: the whole test cannot be simulated from this recording: {told.unread}\n")
     if mapping.plan.roles and not (judged or mapping.static):
         say(f"link: {UNJUDGED}\n")
 
 
-def said_of_time(found: OnTicks, begins: float | None) -> Iterator[str]:
-    """What was found about the data's time: when the test begins (s, of the data), its clock, and rows that lack."""
-    if begins is not None:
-        yield f"start: the plan's ground motion begins at {begins:.6g} s of the data; what lies before is left out"
+def said_of_time(found: OnTicks, told: Told) -> Iterator[str]:
+    """What was found about the data's time: when the test begins, what lies before, its clock, and rows that lack."""
+    if told.begins is not None:
+        yield f"start: the plan's ground motion begins at {told.begins:.6g} s of the data"
+    if told.rest:
+        yield f"at rest: {', '.join(told.rest)} before the test are kept, as they tell the noise of their sensors"
     if found.clock and found.clock.between:
         yield found.clock.told
     if any(found.ends):
@@ -173,14 +179,18 @@ def write(
     found: OnTicks,
     data: str,
     ground: MotionRows | None = None,
+    rest: Mapping[str, Array] = MappingProxyType({}),
     *,
     as_is: bool = False,
 ) -> None:
     """Write the recording: topics and fields for the signals at hand, the plan, and what is stated of the channels.
 
-    With its `ground` motion it can be judged without the file of that motion.
+    With its `ground` motion it can be judged without the file of that motion. `rest` are readings (ticks,) from before
+    the test.
     """
-    from common.recording.imported import IMPORT, ImportedData
+    import numpy as np
+
+    from common.recording.imported import IMPORT, REST, ImportedData
     from common.recording.writer import Recording
     from rths.examine.importing.import_map import lab_signals
 
@@ -198,7 +208,11 @@ def write(
     recording.metadata("plan", {"toml": plan.toml(), "digest": plan.digest()})
     recording.describe()
     gaps = tuple((begin - found.begin, end - found.begin) for begin, end in found.gaps)
-    recording.metadata(IMPORT, ImportedData(data, mapping.static, stated, as_is, gaps).metadata())
+    kept = tuple((known[name][0], known[name][1].name) for name in rest)
+    recording.metadata(IMPORT, ImportedData(data, mapping.static, stated, as_is, gaps, kept).metadata())
+    if rest:
+        readings = np.stack([*rest.values()]).astype("<f8")
+        recording.attach(REST, readings.tobytes(), "application/octet-stream")
     if ground:
         recording.ground(ground[0].describe(), plan.ground_motion.scale, ground[1])
     for topic, rows in columns.items():

@@ -86,7 +86,7 @@ def test_the_ends_of_whitened_noise_are_as_loud_as_the_rest() -> None:
     noise = averaged(np.asarray(signal.sosfilt(smooth, white(14, TICKS))[4000:]))
     flat, _ = whitened(noise, [noise])
     assert np.max(np.abs(flat)) < 5.0
-    assert sensor_noise.heaviness(flat) < 1.2
+    assert colour.heaviness(flat) < 1.2
 
 
 def test_slow_noise_is_alike_in_two_stretches_and_a_motion_in_one_of_them_is_not() -> None:

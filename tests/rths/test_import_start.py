@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.recording.imported import at_rest
 from models.registry import Array
 from rths.examine.importing.beginning import first_tick, ticks_before
 from tests.rths.imports import PLAN, TIMES, table
@@ -72,3 +73,28 @@ def test_the_first_tick_of_a_reading_on_straight_lines_lies_between_rows(off: fl
     reading = np.interp(times - begin, TIMES[:350], planned)
     found = first_tick(times, reading, planned, 1.21, INTERVAL)
     assert found == pytest.approx(begin, abs=INTERVAL / 8.0)
+
+
+@pytest.mark.parametrize(
+    ("before", "moves_until", "kept"),
+    [(4.0, -9.0, 3.9), (4.0, -2.5, 2.4), (4.0, -1.0, 0.0), (1.5, -9.0, 0.0)],
+)
+def test_readings_at_rest_before_a_test_are_kept(
+    before: float, moves_until: float, kept: float, bring: Any, capsys: Any
+) -> None:
+    t = INTERVAL * np.arange(round((before + 3.0) / INTERVAL)) - before
+    noise = 1e-3 * np.random.default_rng(8).standard_normal(t.size)
+    command = drift(t) + np.where(t < moves_until, 2.0, 0.0)
+    rows = 'actuator_command = { column = "u", unit = "mm" }\ncolumn_displacement = { column = "y", unit = "mm" }\n'
+    code, run = bring(
+        table("t,u,y", t + before, command, drift(t) + noise), rows, f'time = "t"\nstart = {before}\n'
+    )
+    assert code == 0
+    found = at_rest(run)
+    assert ("at rest: column_displacement before" in capsys.readouterr().out) == (kept > 0.0)
+    assert [*found] == ([("master", "column_displacement")] if kept else [])
+    for values in found.values():
+        assert values.size == pytest.approx(kept / INTERVAL, abs=7)
+        last = int(np.searchsorted(t, -0.05 + 1e-9))
+        assert values == pytest.approx(1e-3 * noise[last - values.size : last], abs=1e-12)
+    assert run.columns["master"]["t"].size == pytest.approx(300, abs=1)

@@ -1,0 +1,71 @@
+"""The noise of sensors by readings at rest before a test."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from diagnosis.fits import fitting, residuals, sensor_noise
+from diagnosis.fits.residuals import Data
+from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.signals.noise_model import NoiseModel
+from tests.diagnosis.cases import Cases, lab_b
+
+SECONDS = 12.0  # of readings at rest
+SIGNAL = "damper_stroke"
+
+
+def with_rest(cases: Cases, times: float, slow: float) -> tuple[Data, int, float]:
+    """A laboratory with white noise of its stroke before a test, `times` that of the test, beside `slow` noise."""
+    record = cases.record(duration=20.0)
+    data = residuals.prepare(lab_b(record), record)
+    bare = fitting.fit(data, {})
+    data = sensor_noise.remodelled(bare)
+    place = data.part.signals.index(SIGNAL)
+    level = float(data.white[place])
+    draws = np.random.default_rng(4).standard_normal((2, round(SECONDS / record.plan.test.interval)))
+    kept = times * level * draws[0] + slow * level * np.asarray(
+        signal.lfilter([1.0], [1.0, -0.995], draws[1])
+    )
+    part = data.part.first(data.groups * data.group)
+    assert isinstance(part, LaboratoryPart)
+    part.rest = tuple(kept if name == SIGNAL else None for name in data.part.signals)
+    return replace(data, part=part), place, level
+
+
+@pytest.mark.parametrize("times", [0.95, 1.05])
+def test_white_noise_at_rest_is_white_in_a_test(cases: Cases, times: float) -> None:
+    data, place, level = with_rest(cases, times, 0.0)
+    found = sensor_noise.before_the_test(data, place)
+    assert found == NoiseModel(level, source="at rest")
+    other = data.part.signals.index("table_displacement")
+    assert sensor_noise.before_the_test(data, other) is None
+
+
+def test_slow_noise_at_rest_is_noise_in_a_test(cases: Cases) -> None:
+    data, place, level = with_rest(cases, 1.0, 0.1)
+    found = sensor_noise.before_the_test(data, place)
+    assert found is not None
+    assert (found.kind, found.source, found.unproven) == ("ar", "at rest", False)
+    assert found.density is not None
+    assert found.density[0] > 20.0 * level**2
+    assert found.density[-1] == pytest.approx(level**2, rel=0.3)
+
+
+@pytest.mark.parametrize("times", [0.5, 2.0, 0.0])
+def test_readings_of_another_noise_at_the_highest_frequencies_tell_nothing(
+    cases: Cases, times: float
+) -> None:
+    data, place, _ = with_rest(cases, times, 0.0)
+    assert sensor_noise.before_the_test(data, place) is None
+
+
+def test_too_few_readings_tell_nothing(cases: Cases) -> None:
+    data, place, _ = with_rest(cases, 1.0, 0.0)
+    part = data.part.first(data.groups * data.group)
+    assert isinstance(part, LaboratoryPart)
+    part.rest = tuple(one if one is None else one[:150] for one in part.rest)
+    assert sensor_noise.before_the_test(replace(data, part=part), place) is None
