@@ -311,7 +311,8 @@ def likeliest(search: Search) -> Search:
     chosen = search.chosen
     same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
     best = min(same, key=lambda fit: fit.cost, default=chosen)
-    if best.cost > chosen.cost - fitting.TIED or remaining(best) > remaining(chosen) or plainer(chosen, best):
+    seen_more = remaining(best) > max(remaining(chosen), MATERIAL)
+    if best.cost > chosen.cost - fitting.TIED or seen_more or plainer(chosen, best):
         return search
     return in_front(search, best)
 

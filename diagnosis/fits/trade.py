@@ -50,11 +50,13 @@ def tied(chosen: Fit, other: Fit) -> bool:
 
 
 def plainer(fit: Fit, other: Fit) -> bool:
-    """Whether a fit with fewer free parameters than another one does the same to what formulas of one law differ by.
+    """Whether other values of the plan do what laws with more free parameters do, to what formulas differ by.
 
-    So small a difference, which nobody could see, is no reason for a further parameter.
+    So small a difference, which nobody could see, is no reason for another mechanism.
     """
-    if freedom(fit)[0] >= freedom(other)[0] or (leaves(fit) and not leaves(other)):
+    come = set(fit.names) - set(other.names)
+    values = come <= set(values_of_plan(fit.data, fit.values))
+    if not (come and values) or freedom(fit)[0] >= freedom(other)[0] or (leaves(fit) and not leaves(other)):
         return False
     apart = np.sqrt(np.mean(np.square(fit.reduced - other.reduced), axis=0) / fit.data.group)
     return bool(np.all(apart <= np.minimum(MATERIAL, OF_FORMULA * model_error(other))))
