@@ -41,6 +41,7 @@ WITHIN = 0.04  # s, within which the steps are counted that such a reading cross
 # Averaged samples that a step lasts where a reading rests on it, and the share of the test in which no step may last so
 # long for what it errs by to count as noise of that size.
 LONGEST_STEP, MOVING = 5.0, 0.5
+HELD = 0.9  # of what a moving reading errs by from its steps, from which on its noise holds that as well
 SPARSE = 0.5  # of an averaged sample's ticks that must be there
 # Deviations beyond which a sample counts as this far out: of normal noise one sample in 5e8 is, and what impacts leave
 # in all signals counts as little. The rms of Student's t with four degrees of freedom is then found to 2 to 6 %, where
@@ -341,7 +342,9 @@ def measured_by(data: Data, white: Array) -> Data:
     known = np.ones((data.groups, white.size))
     heard = white**2 + rounding**2
     heard[still] = white[still] ** 2 + (COARSE * data.rounded[still]) ** 2
-    heard[moving] = np.maximum(white, rounding)[moving] ** 2  # what a moving reading errs by is in its noise
+    for place in moving:
+        if white[place] > HELD * rounding[place]:
+            heard[place] = white[place] ** 2  # which holds what a reading errs by as it moves
     sigma = np.sqrt(heard + least**2)
     for place in moving:
         more = (rounding[place] / sigma[place]) ** 2

@@ -313,8 +313,8 @@ def model(data: Data, rest: Remainder, part: QuietPart, place: int) -> NoiseMode
     resolution = float(data.rounded[place])
     segments = stretches(rest.noise[:, place], quiet)
     heard = float(rest.single[:, place][np.repeat(quiet, data.group)].std())
-    # steps that no noise hides count by themselves, and more than noise of their size
-    stepping = resolution > residuals.STEPPING * max(flat, heard)
+    # steps on which a reading rests count by themselves, and more than noise of their size
+    stepping = resolution > residuals.STEPPING * max(flat, heard) and data.sigma[place] > resolution
     smooth = data.static and source != "at rest"  # what changes slowly is the error of a law
     if stepping or smooth or not segments or not np.any(rest.noise[:, place]):
         return NoiseModel(flat, lines=lines, resolution=resolution)
