@@ -17,7 +17,7 @@ from common.roles import MASTER
 from diagnosis.findings import gaps, how_far, report, verdict
 from diagnosis.findings.certainty import costs, trust
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.logged.building import own_noise, verdict_on, verdict_over_longer
+from diagnosis.findings.logged.building import by_balance, own_noise, verdict_on
 from diagnosis.findings.logged.logger import by_building
 from diagnosis.fits import fitting, hypothesis, residuals, settling, worth
 from diagnosis.fits.residuals import over_longer
@@ -258,8 +258,8 @@ def test_noise_that_only_the_controller_read_is_no_fault_of_the_building(cases: 
     found = verdict_on(residuals.prepare(Building(unread), unread), scales, view)
     assert found.outcome == "none"
     assert not found.search.chosen.z.any()  # no parameter moves to make that noise smaller
-    heavier = cases.record({"structure.mass": {"factor": 1.1}})
-    assert verdict_over_longer(logged(heavier), scales) is None
+    heavier = by_balance(logged(cases.record({"structure.mass": {"factor": 1.1}})), scales)
+    assert heavier.effects == ("structure.mass",)
 
 
 def stated(whole: Record, names: Sequence[str], noise: float = LEVEL) -> Record:

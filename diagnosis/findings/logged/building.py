@@ -39,7 +39,24 @@ def verdict_on(data: Data, scales: Scales, view: Data | None = None) -> PartVerd
         verdict = judge(search(data, scales))
         if view is None or verdict.outcome not in UNNAMED:
             return verdict
-    return as_planned(verdict_over_longer(view, scales) or judge(search(view, scales)))
+    return as_planned(by_balance(view, scales))
+
+
+def by_balance(view: Data, scales: Scales) -> PartVerdict:
+    """The verdict on a building's balance: that over longer averages where these show no gap, or explain one.
+
+    What its parameters or forces do shows over these as well. Noise that only the controller read does not: over
+    shorter ones it shrinks with the building's parameters, which move by tolerances for that, or is a gap without a
+    cause beside what explains all over longer ones.
+    """
+    part = view.part
+    longer = residuals.over_longer(view, part) if isinstance(part, LoggedBuilding) else None
+    over_longer = None if longer is None else judge(search(longer, scales))
+    if over_longer and over_longer.outcome in WITHOUT_GAP:
+        return over_longer
+    verdict = judge(search(view, scales))
+    explains = over_longer is not None and over_longer.outcome == "explained"
+    return over_longer if over_longer and explains and verdict.outcome in UNNAMED else verdict
 
 
 def as_planned(verdict: PartVerdict) -> PartVerdict:
@@ -52,18 +69,6 @@ def as_planned(verdict: PartVerdict) -> PartVerdict:
     data = verdict.search.data
     planned = fitting.at(data, {}, np.zeros(verdict.search.chosen.z.size))
     return replace(verdict, search=replace(verdict.search, chosen=planned))
-
-
-def verdict_over_longer(view: Data, scales: Scales) -> PartVerdict | None:
-    """The verdict on a building's balance over longer averages where these show no gap, else None.
-
-    What its parameters or forces do shows over these as well. Noise that only the controller read does not: over
-    shorter ones it shrinks with the building's parameters, which move by tolerances for that.
-    """
-    part = view.part
-    longer = residuals.over_longer(view, part) if isinstance(part, LoggedBuilding) else None
-    verdict = None if longer is None else judge(search(longer, scales))
-    return verdict if verdict and verdict.outcome in WITHOUT_GAP else None
 
 
 def own_noise(data: Data) -> bool:
