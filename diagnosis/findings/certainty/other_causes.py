@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
+
+import numpy as np
 
 from diagnosis.findings.sensors.one_motion import one_place
 from diagnosis.findings.sensors.own_reading import errors, gives_energy, of_column
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.hypothesis import Problem
 from diagnosis.fits.search import Search
 from diagnosis.fits.unexplained import foresees, model_error
 from diagnosis.recorded.joined import column_of, laboratory_of
@@ -16,6 +20,8 @@ from diagnosis.recorded.parts import MODEL_ERROR
 # Probability of several effects of which one unknown cause may look the same, over that without: half, as one cause is
 # no less likely than two.
 EITHER = 0.5
+MANY = 5  # free parameters of an effect, from which on it may follow nearly anything
+TOLD = 0.9  # share of a parameter's standard deviation without data that is left where these tell it
 FORGOTTEN = 3.0  # time constants, within which a high-pass has forgotten 95 %
 
 
@@ -46,6 +52,11 @@ def other_causes(search: Search) -> Iterator[str]:
             f"With {name} the load cell has not forgotten a force by the end of the recording. A specimen that relaxes "
             "may look the same: these signals cannot tell them apart."
         )
+    if name := told_by_little(fit):
+        yield (
+            f"Most parameters of {name} may have any value in their ranges, so that it follows nearly any force of its "
+            "specimen. Another law may look the same: these signals cannot tell them apart."
+        )
     if loop := loop_of_several(search):
         yield (
             f"Several values of the plan are named of the {loop}. One other part of its loop, such as a filter in its "
@@ -74,6 +85,27 @@ def may_relax(fit: Fit) -> str:
     name = f"{part.lab.sensor(part.lab.kind.channels.force)}.high_pass"
     lasts = fit.data.system.plan.test.interval * len(part.measured)
     return name if name in fit.values and FORGOTTEN * fit.values[name]["time_constant"] > lasts else ""
+
+
+def told_by_little(fit: Fit) -> str:
+    """The effect with many free parameters of which the data tell fewer than half, empty for none.
+
+    A parameter is told where its standard deviation, which is the range's over √12 before any data, shrinks by a
+    tenth or more.
+    """
+    problem = Problem(fit.data, fit.values)
+    counts = Counter(item.effect for item in problem.frees)
+    many = [name for name, count in counts.items() if count >= MANY]
+    if not many:
+        return ""
+    low, high = problem.bounds()
+    known = np.square(np.asarray(high) - low) / 12.0
+    known[: fit.z.size] = 1.0
+    scale = np.sqrt(known)
+    slopes = fit.central * scale
+    left = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes + np.eye(scale.size))))[fit.z.size :]
+    told = Counter(item.effect for item, share in zip(problem.frees, left, strict=True) if share < TOLD)
+    return next((name for name in many if 2 * told[name] < counts[name]), "")
 
 
 def loop_of_several(search: Search) -> str:
