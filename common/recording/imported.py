@@ -171,9 +171,8 @@ class ImportedData:
     channels: Mapping[str, Mapping[str, ImportedChannel]] = field(default_factory=dict)
     as_is: bool = False  # units and signs are not checked for plausibility, at the user's request
     gaps: tuple[tuple[float, float], ...] = ()  # s of the test, between which rows are missing
-    rest: tuple[
-        tuple[str, str], ...
-    ] = ()  # topics and names of the readings that are kept from before the test
+    # topics and names of the readings at rest that are kept from before the test
+    rest: tuple[tuple[str, str], ...] = ()
 
     def channel(self, topic: str, name: str) -> ImportedChannel:
         """What is stated about a signal; `NOTHING_STATED` for one that the map does not name."""
@@ -238,10 +237,21 @@ def imported(run: Run) -> ImportedData | None:
 
 
 def at_rest(run: Run) -> dict[tuple[str, str], Samples]:
-    """Readings (ticks,) at the interval of the test from before it, by topic and name; empty where none are kept."""
+    """Readings (ticks,) at the interval of the test from before it, by topic and name; empty where none are kept.
+
+    Raises:
+        InputError: they are damaged.
+    """
     stated = imported(run)
-    names = stated.rest if stated is not None and REST in run.attachments else ()
-    values = np.frombuffer(run.attachments[REST], dtype="<f8").reshape(len(names), -1) if names else ()
+    names = stated.rest if stated is not None else ()
+    if not names or REST not in run.attachments:
+        return {}
+    try:
+        values = np.frombuffer(run.attachments[REST], dtype="<f8").reshape(len(names), -1)
+    except ValueError:
+        raise InputError(
+            f"{run.path} is damaged: its attachment '{REST}' cannot be read; import the data again."
+        ) from None
     return dict(zip(names, values, strict=True))
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from common.errors import InputError
 from common.recording.imported import at_rest
 from models.registry import Array
 from rths.examine.importing.beginning import first_tick, ticks_before
@@ -98,3 +100,12 @@ def test_readings_at_rest_before_a_test_are_kept(
         last = int(np.searchsorted(t, -0.05 + 1e-9))
         assert values == pytest.approx(1e-3 * noise[last - values.size : last], abs=1e-12)
     assert run.columns["master"]["t"].size == pytest.approx(300, abs=1)
+
+
+def test_readings_at_rest_that_are_damaged_are_refused_in_one_sentence(bring: Any) -> None:
+    t = INTERVAL * np.arange(700) - 4.0
+    rows = 'actuator_command = { column = "u", unit = "mm" }\ncolumn_displacement = { column = "y", unit = "mm" }\n'
+    _, run = bring(table("t,u,y", t + 4.0, drift(t), drift(t)), rows, 'time = "t"\nstart = 4.0\n')
+    assert at_rest(replace(run, attachments={})) == {}
+    with pytest.raises(InputError, match="'at_rest' cannot be read"):
+        at_rest(replace(run, attachments={"at_rest": bytes(7)}))

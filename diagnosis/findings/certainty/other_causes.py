@@ -99,7 +99,7 @@ def told_by_little(fit: Fit) -> str:
     if not many:
         return ""
     low, high = problem.bounds()
-    known = np.square(np.asarray(high) - low) / 12.0
+    known = np.square(high - low) / 12.0
     known[: fit.z.size] = 1.0
     scale = np.sqrt(known)
     slopes = fit.central * scale
