@@ -50,6 +50,15 @@ def test_a_test_begins_where_its_ground_motion_does(
     assert ("start: the plan's ground motion begins at 1.57" in capsys.readouterr().out) == (before > 0.0)
 
 
+def test_a_motion_that_comes_late_by_little_is_no_beginning(bring: Any, capsys: Any, tmp_path: Path) -> None:
+    (tmp_path / "motion.csv").write_text(table("time (s),acceleration (m/s2)", TIMES, shaking(TIMES)))
+    t = INTERVAL * np.arange(390)
+    code, run = bring(table("t,a,x", t, shaking(t - 0.2), drift(t - 0.2)), COLUMNS, plan=PLAN + MOTION)
+    assert code == 0
+    assert run.columns["master"]["t"].size == 390
+    assert "start: " not in capsys.readouterr().out
+
+
 def test_a_start_that_the_map_states_is_taken(bring: Any, capsys: Any, tmp_path: Path) -> None:
     (tmp_path / "motion.csv").write_text(table("time (s),acceleration (m/s2)", TIMES, shaking(TIMES)))
     t = np.asarray(INTERVAL * np.arange(500) - 1.0, dtype=np.float64)

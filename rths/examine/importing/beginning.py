@@ -17,7 +17,8 @@ from rths.examine.importing.time_base import pick, time_base
 AGREES = 0.95  # correlation of the recorded motion with the plan's from where the test begins
 BETTER = 0.5  # of what it lacks to one from the first row on, which less must be lacking there
 LACKING = 1e-6  # that a correlation may lack to the best one
-FEWEST = 2  # ticks before the test: fewer are what a logger begins early
+FEWEST = 2  # rows with a number, without which there is no motion
+AHEAD = 0.5  # s before the test at least: less may be an error of the controller, which reads the motion late
 HELD = 0.5  # share of the plan's motion, by its energy, that the data must hold
 PLACES = 16  # in an interval, at which the first tick may be
 # Times the least error, and an error of a motion that is printed exactly: of places where a held motion is the same the
@@ -43,7 +44,7 @@ def begun(mapping: ImportMap, table: DataTable, data: Path) -> ImportMap:
         return mapping
     grid = np.arange(times[0], times[-1], interval)
     ahead = ticks_before(np.interp(grid, times[there], column[there]), planned)
-    if ahead < FEWEST:
+    if ahead * interval < AHEAD:
         return mapping
     begin = first_tick(times[there], column[there], planned, times[0] + ahead * interval, interval)
     return replace(mapping, start=float(times[np.searchsorted(times, begin)]))
