@@ -42,7 +42,11 @@ SURE = 4.0  # standard errors beyond which noise follows the motion
 # Motion elsewhere over that of the quiet part, from which on noise that is as loud in both does not follow it.
 VARIED = 2.0
 LEAST = 4.0  # s of a recording without which no flexible model is asked
-AS_LOUD = 1.3  # of the noise at the highest frequencies before a test, up to which it is that of the test
+# Times the density before the test, from which on slow noise in the test is another one: some seconds tell it to less.
+LOUDER = 4.0
+# Of the noise at the highest frequencies before a test, up to which it is that of the test: both are known to 3 %, and
+# readings that were moved in time have less.
+AS_LOUD = 1.08
 LOWER = 0.9  # of the noise first found, from which on a lower one is believed
 
 
@@ -318,7 +322,8 @@ def model(data: Data, rest: Remainder, part: QuietPart, place: int) -> NoiseMode
     smooth = data.static and source != "at rest"  # what changes slowly is the error of a law
     if stepping or smooth or not segments or not np.any(rest.noise[:, place]):
         return NoiseModel(flat, lines=lines, resolution=resolution)
-    if (known := before_the_test(data, place)) is not None:
+    known = before_the_test(data, place)
+    if known is not None and known.density is None:
         return replace(known, lines=lines, resolution=resolution)
     if alike(rest.noise[:, place], quiet):
         quiet, source, steady = np.ones_like(quiet), "residual", part.varied > VARIED
@@ -331,14 +336,19 @@ def model(data: Data, rest: Remainder, part: QuietPart, place: int) -> NoiseMode
     rms = float(rest.single[:, place][np.repeat(quiet, data.group)].std())
     gains = colour.gains(density + data.beside[place], data.groups)[:, None]
     tails = colour.heaviness(colour.whitened(rest.noise[:, [place]], gains)[quiet, 0])
+    if known is not None and known.density is not None:
+        most = known.at_most(density)
+        if np.any(density > LOUDER * most):
+            return replace(known, lines=lines, resolution=resolution, density=most)
+        source = "at rest"
     return NoiseModel(rms, "ar", order, source, lines, resolution, density, samples, tails, steady)
 
 
 def before_the_test(data: Data, place: int) -> NoiseModel | None:
     """The noise of one signal by its readings at rest before the test, None where none are kept.
 
-    It is none either where the sensor is far louder or quieter in the test at its highest frequencies: a pump that
-    did not run, or a converter whose noise lies below its step.
+    Its level is that of the highest frequencies in the test. It is none where the sensor is far louder or quieter
+    there: a pump that did not run, or a converter whose noise lies below its step.
     """
     kept = data.part.rest[place] if isinstance(data.part, LaboratoryPart) else None
     flat, interval = float(data.white[place]), data.system.plan.test.interval
@@ -352,15 +362,15 @@ def before_the_test(data: Data, place: int) -> NoiseModel | None:
     level = float(data.white_part(every)[place])
     if not flat < AS_LOUD * level < AS_LOUD**2 * flat:
         return None
+    still *= flat / level
     averaged = still[: groups * data.group].reshape(groups, data.group).sum(axis=1) / math.sqrt(data.group)
     if colour.is_white([averaged], flat, float(data.rounded[place])):
         return NoiseModel(flat, source="at rest")
     density, order = colour.density([averaged])
     gains = colour.gains(density + data.beside[place], groups)[:, None]
     tails = colour.heaviness(colour.whitened(averaged[:, None], gains)[:, 0])
-    return NoiseModel(
-        float(still.std()), "ar", order, "at rest", density=density, samples=groups, tails=tails
-    )
+    rms = float(still.std())
+    return NoiseModel(rms, "ar", order, "at rest", density=density, samples=groups, tails=tails)
 
 
 def alike(noise: Array, quiet: Mask) -> bool:

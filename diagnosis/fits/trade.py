@@ -55,8 +55,9 @@ def plainer(fit: Fit, other: Fit) -> bool:
     So small a difference, which nobody could see, is no reason for another mechanism.
     """
     come = set(fit.names) - set(other.names)
-    values = come <= set(values_of_plan(fit.data, fit.values))
-    if not (come and values) or freedom(fit)[0] >= freedom(other)[0] or (leaves(fit) and not leaves(other)):
+    if not come or freedom(fit)[0] >= freedom(other)[0]:
+        return False
+    if not come <= set(values_of_plan(fit.data, fit.values)) or (leaves(fit) and not leaves(other)):
         return False
     apart = np.sqrt(np.mean(np.square(fit.reduced - other.reduced), axis=0) / fit.data.group)
     return bool(np.all(apart <= np.minimum(MATERIAL, OF_FORMULA * model_error(other))))

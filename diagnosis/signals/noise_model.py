@@ -6,8 +6,15 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+from diagnosis.signals import colour
 from models.registry import Array
 
+WAVES = 8.0  # half waves that a record must hold of a frequency to tell how loud its noise is
+# Times the lowest such frequency, and times the density there, by which noise is louder at that one if it goes on to
+# become louder below it.
+OCTAVES, RISING = 16.0, 2.0
 Kind = Literal["white", "ar"]
 Source = Literal["at rest", "quiet part", "residual"]
 
@@ -31,3 +38,12 @@ class NoiseModel:
     def unproven(self) -> bool:
         """Whether only a residual tells of its colour, and one that may follow the motion, as a gap does."""
         return self.density is not None and self.source == "residual" and not self.steady
+
+    def at_most(self, density: Array) -> Array:
+        """Its density (401,) over `colour.GRID`, at frequencies too low for its record at least another one's.
+
+        It is so where its own becomes louder towards these, as that of pink noise does.
+        """
+        own, lowest = np.asarray(self.density), WAVES / self.samples
+        rises = np.interp(lowest, colour.GRID, own) > RISING * np.interp(OCTAVES * lowest, colour.GRID, own)
+        return np.where((lowest > colour.GRID) & rises, np.maximum(density, own), own)
