@@ -11,6 +11,7 @@ from scipy import signal
 from diagnosis.fits import fitting, residuals, sensor_noise
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.signals import colour
 from diagnosis.signals.noise_model import NoiseModel
 from tests.diagnosis.cases import Cases, lab_b
 
@@ -69,3 +70,17 @@ def test_too_few_readings_tell_nothing(cases: Cases) -> None:
     assert isinstance(part, LaboratoryPart)
     part.rest = tuple(one if one is None else one[:150] for one in part.rest)
     assert sensor_noise.before_the_test(replace(data, part=part), place) is None
+
+
+@pytest.mark.parametrize(("slope", "lifted"), [(0.0, False), (1.0, True)])
+def test_below_what_readings_at_rest_tell_only_noise_that_becomes_louder_there_may_be_louder(
+    slope: float, lifted: bool
+) -> None:
+    """Pink noise has the slope 1; eight half waves of a record of 400 samples begin at a fiftieth of the highest."""
+    known = NoiseModel(1.0, density=np.maximum(colour.GRID, 0.02) ** -slope, samples=400.0)
+    other = 1e3 * np.ones(colour.GRID.size)
+    below = colour.GRID < 0.02
+    most = known.at_most(other)
+    assert np.array_equal(most[~below], np.asarray(known.density)[~below])
+    assert np.all(most[below] == (1e3 if lifted else 1.0))
+    assert np.array_equal(known.at_most(0.0 * other), np.asarray(known.density))
