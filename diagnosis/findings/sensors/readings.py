@@ -150,12 +150,18 @@ def levels(datas: list[Data], noises: list[Array] | None = None) -> dict[str, fl
 def floors(
     noise: Mapping[str, float], steps: Mapping[str, float], named: Sequence[SensorFinding], record: Record
 ) -> dict[str, float]:
-    """Rms noise of every reading, no less than what rounding makes; steps of effects `named` are simulated instead."""
+    """Rms noise of every reading, no less than what rounding makes.
+
+    Steps of effects `named` are simulated instead, and what they make is taken from noise that holds it.
+    """
     own = {item.effect for item in named}
     result = dict(noise)
     for name in noise.keys() & steps.keys():
+        rounding = steps[name] / math.sqrt(12.0)
         if effect_on(record, name, "quantization") not in own:
-            result[name] = max(noise[name], steps[name] / math.sqrt(12.0))
+            result[name] = max(noise[name], rounding)
+        elif noise[name] > rounding:
+            result[name] = math.sqrt(noise[name] ** 2 - rounding**2)
     return result
 
 
