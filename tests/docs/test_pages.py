@@ -92,6 +92,7 @@ UNRUN = {
         "rths blind --set loggers --seed 9674 --cases 30 --only catalogue --duration 12",
         "rths blind --set loggers --seed 9675 --cases 16 --only clean --duration 12",
         "rths blind --set loggers --seed 9677 --cases 30",
+        "rths blind --set loggers --seed 9678 --cases 16 --only clean --duration 12",
         "rths blind --set loggers --seed 9777 --cases 90 --only catalogue --duration 12",
         "rths blind --set out_of_step --seed 1 --cases 11 --only clean --duration 12",
         "rths blind --set out_of_step --seed 2 --cases 33 --duration 12",
