@@ -7,6 +7,8 @@ from typing import Any
 
 from common.plan.schema import NAME, Storeys, StoreysOrMatrix, inner, key
 
+LONGEST_TEST = 7200.0  # s
+
 
 @dataclass(frozen=True)
 class Test:
@@ -15,7 +17,7 @@ class Test:
     __test__ = False  # not a test case of pytest
 
     name: str = key("name of the test, part of topics and file names", default="default", pattern=NAME)
-    duration: float = key("length of the test", default=40.0, unit="s", above=0.0, most=7200.0)
+    duration: float = key("length of the test", default=40.0, unit="s", above=0.0, most=LONGEST_TEST)
     interval: float = key("control interval", default=0.002, unit="s", least=1e-4, most=0.1)
     seed: int = key("seed of every random draw", default=1, least=0)
 

@@ -118,3 +118,22 @@ def test_readings_at_rest_that_are_damaged_are_refused_in_one_sentence(bring: An
     assert at_rest(replace(run, attachments={})) == {}
     with pytest.raises(InputError, match="'at_rest' cannot be read"):
         at_rest(replace(run, attachments={"at_rest": bytes(7)}))
+
+
+@pytest.mark.parametrize(
+    ("scale", "apart", "message"),
+    [
+        (1e6, 0.0, "its rows are 1e+04 s apart"),
+        (1.0, 86_400.0, "its rows last 86403.9 s, and a test lasts 7200 s at most"),
+    ],
+)
+def test_times_that_last_longer_than_a_test_are_refused_in_one_sentence(
+    scale: float, apart: float, message: str, bring: Any, capsys: Any, tmp_path: Path
+) -> None:
+    """A search for the test in them would ask for more memory than there is."""
+    (tmp_path / "motion.csv").write_text(table("time (s),acceleration (m/s2)", TIMES, shaking(TIMES)))
+    t = INTERVAL * np.arange(390)
+    times = scale * t + np.where(t > 3.8, apart, 0.0)
+    code, _ = bring(table("t,a,x", times, shaking(t), drift(t)), COLUMNS, plan=PLAN + MOTION)
+    assert code == 2
+    assert message in capsys.readouterr().err

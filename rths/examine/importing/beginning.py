@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from common.errors import InputError
+from common.plan.tables import LONGEST_TEST
 from models.registry import Array
 from report.text.tabular import DataTable
 from rths.examine.importing.import_map import ImportMap
@@ -40,7 +41,7 @@ def begun(mapping: ImportMap, table: DataTable, data: Path) -> ImportMap:
     column = pick(table, source.column, data)[rows]
     there = np.isfinite(column)
     interval = mapping.plan.test.interval
-    if np.count_nonzero(there) < FEWEST:
+    if np.count_nonzero(there) < FEWEST or times[-1] - times[0] > LONGEST_TEST:
         return mapping
     grid = np.arange(times[0], times[-1], interval)
     ahead = ticks_before(np.interp(grid, times[there], column[there]), planned)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from common.errors import InputError, PlanError
 from common.plan.plan import Plan
 from common.plan.read import with_test
+from common.plan.tables import LONGEST_TEST
 from common.recording.imported import ImportedChannel
 from common.roles import MASTER
 from common.signals import FieldType, Signal
@@ -103,8 +104,8 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
     """The signals at the plan's interval, by a cubic spline; numbers of messages and what holds its value are held.
 
     Raises:
-        InputError: a column is missing or has a hole, its unit is of another quantity, or time does not increase or,
-            unless `as_is`, has another unit.
+        InputError: a column is missing or has a hole, its unit is of another quantity, or time does not increase, is
+            longer than a test or, unless `as_is`, has another unit.
     """
     theirs, rows = time_base(mapping, table, data)
     ends = (0, 0) if mapping.static else outside(mapping, table, data, theirs, rows)
@@ -118,6 +119,7 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
     else:
         if not as_is:
             refuse_unit(mapping, theirs, data)
+        refuse_length(theirs, data)
         gaps, begin = missing_rows(theirs), float(theirs[0])
         theirs = theirs - begin
         t = np.arange(int(np.floor(theirs[-1] / interval + 1e-9)) + 1, dtype=np.float64) * interval
@@ -274,6 +276,16 @@ def refuse_unit(mapping: ImportMap, theirs: Array, data: Path) -> None:
         f"{data}: its rows are {apart:.3g} s apart, and the plan's interval is {interval:.3g} s: check {what}{unit} "
         "and the plan's interval; if they are right, import it with --as-is."
     )
+
+
+def refuse_length(theirs: Array, data: Path) -> None:
+    """Raise InputError where the rows last longer than a test may."""
+    lasts = float(theirs[-1] - theirs[0])
+    if lasts > LONGEST_TEST:
+        raise InputError(
+            f"{data}: its rows last {lasts:.6g} s, and a test lasts {LONGEST_TEST:g} s at most: say with start and "
+            "stop, in the map, which part is the test."
+        )
 
 
 def missing_rows(theirs: Array) -> tuple[tuple[float, float], ...]:
