@@ -41,9 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="further recordings of the same laboratories: one cause must explain all of them",
     )
     parser.add_argument(
-        "--plan",
-        metavar="PLAN",
-        help="what the laboratories should be (default: the plan in FILE)",
+        "--plan", metavar="PLAN", help="what the laboratories should be (default: the plan in FILE)"
     )
     parser.add_argument(
         "--ideal",

@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
             write(path, mapping, found, args.data.name, ground, rest, as_is=args.as_is)
             if not args.as_is:
                 check_slips(path, args.data)
-    told = Told(table.form, unread, mapping.start if stated.start is None else None, rest)
+    told = ImportRemarks(table.form, unread, mapping.start if stated.start is None else None, rest)
     show(args, mapping, found, told)
     return 0
 
@@ -93,7 +93,7 @@ def plan_of(mapping: ImportMap, found: OnTicks) -> Plan:
     return with_test(mapping.plan, duration=found.t.size * mapping.plan.test.interval)
 
 
-class Told(NamedTuple):
+class ImportRemarks(NamedTuple):
     """What is told of an import beside its signals."""
 
     form: TextForm | None  # of a text file
@@ -102,7 +102,7 @@ class Told(NamedTuple):
     rest: Mapping[str, Array]  # readings (ticks,) from before the test
 
 
-def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: Told) -> None:
+def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: ImportRemarks) -> None:
     """Say what was written and read, which signals are absent or interpolated, and what can be judged."""
     from rths.examine.importing.import_map import lab_signals
 
@@ -147,7 +147,7 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: Tol
         say(f"link: {UNJUDGED}\n")
 
 
-def said_of_time(found: OnTicks, told: Told) -> Iterator[str]:
+def said_of_time(found: OnTicks, told: ImportRemarks) -> Iterator[str]:
     """What was found about the data's time: when the test begins, what lies before, its clock, and rows that lack."""
     if told.begins is not None:
         yield f"start: the plan's ground motion begins at {told.begins:.6g} s of the data"
