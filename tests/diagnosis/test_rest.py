@@ -64,6 +64,43 @@ def test_readings_of_another_noise_at_the_highest_frequencies_tell_nothing(
     assert sensor_noise.before_the_test(data, place) is None
 
 
+@pytest.mark.parametrize(
+    ("at_rest", "source", "kind"),
+    [(None, "residual", "ar"), (0.0, "at rest", "white"), (0.02, "at rest", "ar")],
+)
+def test_slow_noise_in_a_test_is_the_sensors_only_where_it_was_there_at_rest(
+    cases: Cases, at_rest: float | None, source: str, kind: str
+) -> None:
+    """White noise at rest leaves what is slow in the test for a gap."""
+    data, place, level = with_rest(cases, 1.0, at_rest or 0.0)
+    part = data.part.first(data.groups * data.group)
+    assert isinstance(part, LaboratoryPart)
+    if at_rest is None:
+        part.rest = (None,) * len(part.signals)
+    draw = np.random.default_rng(11).standard_normal(len(part.measured))
+    part.measured = part.measured.copy()
+    part.measured[:, place] += 0.02 * level * np.asarray(signal.lfilter([1.0], [1.0, -0.995], draw))
+    fit = fitting.at(replace(data, part=part, noise=()), {}, np.zeros(len(part.nuisances)))
+    found = sensor_noise.remodelled(fit).noise[place]
+    assert (found.source, found.kind) == (source, kind)
+
+
+def test_far_slower_noise_than_at_rest_is_no_noise_of_the_sensor(cases: Cases) -> None:
+    data, place, level = with_rest(cases, 1.0, 0.02)
+    part = data.part.first(data.groups * data.group)
+    assert isinstance(part, LaboratoryPart)
+    draw = np.random.default_rng(11).standard_normal(len(part.measured))
+    part.measured = part.measured.copy()
+    part.measured[:, place] += 0.3 * level * np.asarray(signal.lfilter([1.0], [1.0, -0.995], draw))
+    fit = fitting.at(replace(data, part=part, noise=()), {}, np.zeros(len(part.nuisances)))
+    left = sensor_noise.remodelled(fit)
+    known, found = sensor_noise.before_the_test(left, place), left.noise[place]
+    assert known is not None
+    assert (known.kind, found.source) == ("ar", "at rest")
+    told = colour.GRID > 0.05
+    assert np.asarray(found.density)[told] == pytest.approx(np.asarray(known.density)[told], rel=0.5)
+
+
 def test_too_few_readings_tell_nothing(cases: Cases) -> None:
     data, place, _ = with_rest(cases, 1.0, 0.0)
     part = data.part.first(data.groups * data.group)

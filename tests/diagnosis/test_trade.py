@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.certainty.other_causes import described
-from diagnosis.fits import candidates, fitting, trade, worth
+from diagnosis.fits import candidates, fitting, search, trade, worth
 from diagnosis.fits.fitting import TIED, Fit
 from diagnosis.fits.laws import best
+from diagnosis.fits.search import Search, plainest
 from diagnosis.fits.trade import foremost, parted, simplest, tied
 from laboratories.effects import CATALOGUE
 from models.registry import Array
@@ -115,3 +116,33 @@ def test_another_law_with_as_many_parameters_must_fit_better_and_one_with_more_m
     assert best.simplest(first, [near]) is first
     assert best.simplest(first, [far]) is far
     assert best.simplest(first, [costing(greased, 15.0 - TIED)]) is first
+
+
+@pytest.mark.parametrize(("prior", "stands"), [(4.0, "damper.mass"), (6.0, "sensor.column_force.gain")])
+def test_of_effects_that_the_data_cannot_tell_apart_one_that_strains_nominal_parameters_stands_behind(
+    prior: float, stands: str
+) -> None:
+    """A machine's effect else stands before a sensor's; chance takes 3.84 of Σ z²."""
+    machine = replace(fit(VALUE), z=np.array([np.sqrt(prior)]))
+    sensor = replace(fit({"sensor.column_force.gain": {"factor": 1.1}}), z=np.array([1.0]))
+    for chosen, other in ((machine, sensor), (sensor, machine)):
+        found = plainest(Search(DATA, fit({}, 9.0), chosen, (other,)))
+        assert found.chosen.names == (stands,)
+        assert len(found.alternatives) == 1
+
+
+def test_of_effects_that_the_data_cannot_tell_apart_a_value_of_the_plan_stands_before_a_law() -> None:
+    value, law = fit(VALUE), fit({"damper.asymmetry": {"share": 0.1}}, -1e-5)
+    assert law.cost < value.cost
+    assert plainest(Search(DATA, fit({}, 9.0), law, (value,))).chosen is value
+
+
+@pytest.mark.parametrize(("left", "stands"), [(0.1, True), (0.13, False)])
+def test_a_far_likelier_fit_stands_unless_it_is_seen_to_leave_more(
+    monkeypatch: pytest.MonkeyPatch, left: float, stands: bool
+) -> None:
+    chosen, other = fit(SIDED, 0.5), fit(PAIR)
+    one = replace(other, values={"sensor.column_force.bias": {"offset": 3.0}})
+    monkeypatch.setattr(search, "remaining", lambda item: left if item is one else 0.09)
+    found = search.likeliest(Search(DATA, fit({}, 9.0), chosen, (one,)))
+    assert (found.chosen is one) is stands
