@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -19,18 +20,59 @@ FLOW = 1.0  # the law of `table.second_mass` of a loop that gives way at a speed
 ADDED = 2.0  # that of a mass without which the loop was tuned
 BETWEEN = 2.0  # the law of `table.oil_column` whose dashpot lies between loop and platform
 BEHIND_LOOP = 1.0  # the law of `table.backlash` with the play between loop and platform
+# Effects of a table that its matrices hold; the others act beside them.
+LINEAR = (
+    "compliance",
+    "oil_frequency",
+    "oil_damping",
+    "oil_share",
+    "oil_law",
+    "backlash_law",
+    "second_frequency",
+    "second_share",
+    "second_damping",
+    "second_law",
+)
+KEPT = 64  # matrices of tables
 INPUTS = 5  # columns behind the states: command before and after, motor command, g, table friction
 
 
-def propagation(
-    length: float, table: ShakingTable, damper: Damper, effects: TableEffects, motor_damping: float = math.inf
+def propagations(
+    lengths: Array,
+    table: ShakingTable,
+    damper: Damper,
+    effects: TableEffects,
+    motor_damping: float = math.inf,
 ) -> Array:
-    """Propagation over one segment; shape (n, n + 5).
+    """Propagation over segments of `lengths` (m,) s; shape (m, n, n + 5). It is kept and must not be written to.
 
     `motor_damping` is the damping ratio of a motor of second order, infinite for one of first order.
+
+    Raises:
+        InputError: an ideal table is given compliance, friction or an oil column.
     """
-    if not math.isinf(table.frequency):
-        return lagging_matrix(length, table, damper, effects, motor_damping)
+    if math.isinf(table.frequency):
+        refuse(effects)
+        return np.stack([ideal_matrix(length, damper, motor_damping) for length in lengths.tolist()])
+    linear = TableEffects(**{name: getattr(effects, name) for name in LINEAR})
+    loop = table.frequency, table.damping_ratio
+    return lagging_matrices(tuple(lengths.tolist()), loop, damper, linear, motor_damping)
+
+
+@lru_cache(maxsize=KEPT)
+def lagging_matrices(
+    lengths: tuple[float, ...],
+    loop: tuple[float, float],
+    damper: Damper,
+    effects: TableEffects,
+    motor_damping: float,
+) -> Array:
+    """`lagging_matrix` of each length; most hypotheses of a diagnosis differ in what has no part in them."""
+    return np.stack([lagging_matrix(one, loop, damper, effects, motor_damping) for one in lengths])
+
+
+def refuse(effects: TableEffects) -> None:
+    """Refuse effects that an ideal table cannot have."""
     nulls = {
         "backlash_law": 0.0,
         "compliance": 0.0,
@@ -46,7 +88,6 @@ def propagation(
             raise InputError(
                 f"An ideal table (frequency inf) cannot have the effect '{name}': leave it out, or give a frequency."
             )
-    return ideal_matrix(length, damper, motor_damping)
 
 
 def damper_rows(a: Array, b: Array, damper: Damper, motor_damping: float) -> None:
@@ -98,9 +139,15 @@ def swinging(a: Array, b: Array, rate: int, omega: float, effects: TableEffects)
 
 
 def lagging_matrix(
-    length: float, table: ShakingTable, damper: Damper, effects: TableEffects, motor_damping: float
+    length: float,
+    loop: tuple[float, float],
+    damper: Damper,
+    effects: TableEffects,
+    motor_damping: float,
 ) -> Array:
     """Propagation over one segment of `length` s for a table of second order; shape (n, n + 5).
+
+    `loop` is the table's natural frequency (Hz) and damping ratio.
 
     Under the damper's force F the table gives way as if its command were changed by compliance·F.
     With an oil column the platform follows the table below it as a second oscillator, or by a share σ of its motion:
@@ -110,10 +157,10 @@ def lagging_matrix(
     """
     size = states(damper, effects, motor_damping)
     place, rate = (BASE, BASE_RATE) if size > BASE_RATE else (TABLE, TABLE_RATE)
-    omega = 2.0 * math.pi * table.frequency
+    omega, damping_ratio = 2.0 * math.pi * loop[0], loop[1]
     a, b = np.zeros((size, size)), np.zeros((size, 4))
     a[place, rate] = 1.0
-    a[rate, place], a[rate, rate] = -(omega**2), -2.0 * table.damping_ratio * omega
+    a[rate, place], a[rate, rate] = -(omega**2), -2.0 * damping_ratio * omega
     b[rate, RAMP], b[rate, DRAG] = omega**2, 1.0
     yielding = effects.compliance * omega**2
     a[rate, STROKE] += yielding * damper.stiffness

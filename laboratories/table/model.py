@@ -28,7 +28,7 @@ from laboratories.table.linear import (
     STROKE_RATE,
     TABLE,
     TABLE_RATE,
-    propagation,
+    propagations,
 )
 from laboratories.table.record import (
     BEHIND,
@@ -87,7 +87,7 @@ def build(
     numbers = segments.levels(interval, on_table, on_damper)
     taps, memory, lengths, walk = segments.divided(interval, table.delay, numbers)
     damping = on_damper.motor_damping
-    rows = np.stack([propagation(float(length), table, damper, on_table, damping) for length in lengths])
+    rows = propagations(lengths, table, damper, on_table, damping)
     size = rows.shape[1]
     columns = np.zeros((len(rows), size + INPUTS, max(size, ROWS)))
     columns[:, :, :size] = rows.transpose(0, 2, 1)

@@ -89,9 +89,9 @@ class Crosswise:
     """Predictions of series from features x (n, q), each block's without a look at it."""
 
     def __init__(self, x: Array) -> None:
-        self._x = x
         self._fold = folds(len(x))
-        gram = [x[self._fold == k].T @ x[self._fold == k] for k in range(FOLDS)]
+        self._pieces = [x[self._fold == k] for k in range(FOLDS)]
+        gram = [piece.T @ piece for piece in self._pieces]
         whole = np.sum(gram, axis=0)
         self._turned = [np.linalg.eigh(whole - one) for one in gram]
         self._beside = np.zeros((len(x), 0))
@@ -99,7 +99,7 @@ class Crosswise:
     @property
     def count(self) -> int:
         """Samples of a series."""
-        return len(self._x)
+        return self._fold.size
 
     @property
     def swings(self) -> bool:
@@ -131,7 +131,7 @@ class Crosswise:
 
     def _ridge(self, y: Array) -> Array:
         """Predictions (n, m) from the features."""
-        product = [self._x[self._fold == k].T @ y[self._fold == k] for k in range(FOLDS)]
+        product = [piece.T @ y[self._fold == k] for k, piece in enumerate(self._pieces)]
         wanted = np.sum(product, axis=0)
         said = np.zeros((PENALTIES.size, *y.shape))
         for k, (values, vectors) in enumerate(self._turned):
@@ -139,7 +139,7 @@ class Crosswise:
             wants = vectors.T @ (wanted - product[k])
             heavy = np.maximum(values, 0.0)[:, None] + PENALTIES * int(np.sum(~here))
             weights = vectors @ (wants[:, None, :] / heavy[:, :, None]).reshape(len(values), -1)
-            told = (self._x[here] @ weights).reshape(-1, PENALTIES.size, y.shape[1])
+            told = (self._pieces[k] @ weights).reshape(-1, PENALTIES.size, y.shape[1])
             said[:, here] = told.transpose(1, 0, 2)
         lost = np.sum((y - said) ** 2, axis=1)
         best = np.argmin(lost, axis=0)
