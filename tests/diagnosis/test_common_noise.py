@@ -10,11 +10,11 @@ from scipy import signal
 
 from diagnosis.findings.sensors.common_noise import in_common, unforeseen
 from diagnosis.findings.sites.likely import likely_sites
-from diagnosis.fits import fitting, residuals, settling
+from diagnosis.fits import fitting, residuals, sensor_noise, settling
 from diagnosis.fits.fitting import Fit
 from diagnosis.recorded.record import Record
 from models.registry import Array
-from tests.diagnosis.cases import Cases, lab_b, white
+from tests.diagnosis.cases import Cases, lab_a, lab_b, white
 
 ERROR = 4.0  # rms of the error of a stroke over its noise
 
@@ -54,3 +54,15 @@ def test_noise_of_which_inputs_foresee_nothing_is_none_of_the_gap_of_another_rea
 @pytest.mark.long
 def test_without_a_gap_that_inputs_foresee_no_reading_stands_apart(cases: Cases) -> None:
     assert not any(unforeseen(bare(cases.record(duration=8.0))))
+
+
+def test_a_sensor_that_jumps_has_no_colour_that_the_other_reading_lacks(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    jumps = np.cumsum(np.random.default_rng(3).choice([-1.0, 0.0, 1.0], whole.ticks, p=[1e-3, 0.998, 1e-3]))
+    read = whole.signals["column_displacement"] + 10.0 * whole.planned_noise["column_displacement"] * jumps
+    jumping = replace(whole, signals=whole.signals | {"column_displacement": read})
+    settled = settling.settled(fitting.fit(residuals.prepare(lab_a(jumping), jumping), {}))
+    fit = fitting.at(sensor_noise.whitened(settled), {}, settled.z)
+    assert unforeseen(fit) == [False, True]
+    assert not any(item.density is not None for item in in_common(fit).noise)
+    assert likely_sites(fit) == ("sensor.column_displacement",)

@@ -13,8 +13,6 @@ from diagnosis.fits.unexplained import SIGNIFICANT
 
 # Noise at its loudest frequency over that at the highest ones, up to which it counts as white beside coloured noise.
 FLAT = 2.0
-
-
 NOTHING = 2.0  # standard deviations, below which inputs foresee nothing of a reading
 
 
@@ -24,7 +22,7 @@ def in_common(fit: Fit) -> Data:
     A logger treats its channels alike, so that what one of them has beyond that colour need not be noise. It is white
     unless most readings have coloured noise; a white one among these hides the colour behind the steps of a converter.
     A reading has noise of its own colour where the inputs foresee nothing of it, and surely what another one is missed
-    by.
+    by. What two readings then do not share is no colour that both have.
     """
     white, models, apart = sensor_noise.whitened(fit), sensor_noise.remodelled(fit).noise, unforeseen(fit)
     if not sensor_noise.coloured(fit.data):  # a level known from elsewhere stays
@@ -32,7 +30,7 @@ def in_common(fit: Fit) -> Data:
     rows = list(zip(models, white.white, apart, strict=True))
     pairs = [(item, level) for item, level, alone in rows if level > 0.0 and not alone]
     shapes = [(item, level) for item, level in pairs if sensor_noise.loudness(item, level) > FLAT]
-    if 2 * len(shapes) <= len(pairs):
+    if 2 * len(shapes) <= sum(level > 0.0 for _, level, _ in rows):
         if not any(apart):
             return white
         noise = tuple(
