@@ -11,6 +11,11 @@ from models.registry import Array
 
 ROUNDING = 4.0 * float(np.finfo(np.float64).eps)  # of a value, relative to the largest
 COARSE = 1e3  # roundings that a step must exceed
+# Significant digits of a text that steps of a converter may be looked for behind. Of such a text: the most that a value
+# errs by, in units of the last digit of 0.1 of the largest one, and how many times that a step must exceed. Levels that
+# it must have, as a few of them have a common divisor by chance, and the share of samples that may have a level of their
+# own, as free floats do.
+DIGITS, LAST_DIGIT, COARSE_PRINTED, FEWEST, RECURRING = (12, 10, 9, 8, 7, 6), 5.0, 50.0, 24, 0.5
 # Levels from which on they tell of a step: the two gaps between three free floats have no common divisor.
 LEVELS = 3
 # Of how often the commonest level occurs, up to which one may have come about between two others.
@@ -23,18 +28,31 @@ ALIGNED = 1e-6  # of a step, within which a value counts as a multiple: far more
 def quantum(x: Array) -> float:
     """Step of a signal (n,) whose values are integer multiples of one, about any offset; in x's unit.
 
-    Greatest common divisor of the gaps between its levels, up to rounding. Zero where there is none: for a
-    signal of free floats, or a constant one. A signal of two levels counts as quantised.
+    Greatest common divisor of the gaps between its levels, up to rounding: that of numbers, or where values recur that
+    of a text with a few digits. Zero where there is none: for a signal of free floats, or a constant one. A signal of
+    two levels counts as quantised.
 
     Raises:
         InputError: empty or not finite.
     """
     checked(signal=x)
-    rounding = ROUNDING * float(np.max(np.abs(x)))
+    step = lattice(x, ROUNDING, COARSE)
+    if step == 0.0 and FEWEST < np.unique(x).size < RECURRING * x.size:
+        printed = (lattice(x, LAST_DIGIT * 10.0**-digits, COARSE_PRINTED) for digits in DIGITS)
+        step = next((one for one in printed if one > 0.0), 0.0)
+    return step
+
+
+def lattice(x: Array, relative: float, coarse: float) -> float:
+    """Step of a signal (n,) whose values are known to a share `relative` of the largest; 0 for none.
+
+    A step must be `coarse` times as large as what a value may err by.
+    """
+    rounding = relative * float(np.max(np.abs(x)))
     levels = merged(x, rounding)
     if levels.size < 2:
         return 0.0
-    step = divisor(merged(np.diff(levels), 2.0 * rounding), 2.0 * rounding)
+    step = divisor(merged(np.diff(levels), 2.0 * rounding), 2.0 * rounding, coarse)
     if step == 0.0:
         return 0.0
     places = np.round((levels - levels[0]) / step)
@@ -72,8 +90,8 @@ def merged(x: Array, rounding: float) -> Array:
     return np.asarray(values[np.concatenate([[True], np.diff(values) > rounding])])
 
 
-def divisor(gaps: Array, rounding: float) -> float:
-    """Greatest common divisor of ascending gaps (m,), each known up to `rounding`; 0 where it sinks to that.
+def divisor(gaps: Array, rounding: float, coarse: float) -> float:
+    """Greatest common divisor of ascending gaps (m,), each known up to `rounding`; 0 where it sinks to `coarse` of it.
 
     Euclid's algorithm; the divisor is sharpened by every larger gap, so that rounding does not add up.
     """
@@ -85,7 +103,7 @@ def divisor(gaps: Array, rounding: float) -> float:
         if rest > rounding * (2.0 + 2.0 * (gap / step if step > 0.0 else 0.0) / known):
             step = euclid(rest, step, rounding)
             along, square = 0.0, 0.0
-        if step <= COARSE * rounding:
+        if step <= coarse * rounding:
             return 0.0
         count = round(gap / step)
         along, square = along + count * gap, square + count * count

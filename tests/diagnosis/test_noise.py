@@ -45,6 +45,27 @@ def test_the_quantum_is_found_although_levels_are_missing() -> None:
 
 @given(
     step=st.floats(1e-9, 1e3),
+    digits=st.integers(8, 12),
+    offset=st.floats(-1.0, 1.0),
+    seed=st.integers(0, 99),
+)
+def test_the_quantum_of_a_converter_is_found_in_text_of_a_few_digits(
+    step: float, digits: int, offset: float, seed: int
+) -> None:
+    places = np.round(np.random.default_rng(seed).normal(0.0, 300.0, 6000))
+    values = np.array([float(f"{value:.{digits}g}") for value in (step * (places + offset)).tolist()])
+    assert quantum(values) == pytest.approx(step, rel=1e-6)
+    assert quantum(1e-3 * values) == pytest.approx(1e-3 * step, rel=1e-6)
+
+
+@given(seed=st.integers(0, 99), levels=st.integers(3, 3000))
+def test_free_readings_that_recur_have_no_quantum(seed: int, levels: int) -> None:
+    rng = np.random.default_rng(seed)
+    assert quantum(rng.choice(rng.normal(size=levels), 8000)) == 0.0
+
+
+@given(
+    step=st.floats(1e-9, 1e3),
     rate=st.floats(700.0, 1500.0),
     amplitude=st.floats(2.0, 300.0),
     seed=st.integers(0, 99),

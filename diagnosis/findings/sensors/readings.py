@@ -24,8 +24,8 @@ CONVERTER = 7e-4
 QUIETEST = 0.4
 # Relative error, 95 % of the noise levels found in white noise: 2.3 % in 40 s at 2 ms, 3.5 % in 10 s.
 NOISE_ERROR = 0.03
-# Relative error of a step: far more than the rounding of floats, far less than anything of interest.
-STEP_ERROR = 1e-9
+# Relative error of a step: more than the rounding of floats or of a text, far less than anything of interest.
+STEP_ERROR = 1e-7
 # Least common noise of all sensors as a share of the planned one: below it they count as free of noise.
 LEAST_SCALE = 1e-3
 # Share of repeated samples from which on a sensor misses samples (two equal samples of normal noise are impossible in
