@@ -191,6 +191,7 @@ def remarks(
         *outliers.told(verdicts),
         *(verdict.own.text for verdict in verdicts if verdict.own is not None and verdict.own.text),
         *doubted(verdicts),
+        *drifting(verdicts),
         *where.undecided(verdicts),
     ]
 
@@ -205,7 +206,7 @@ def with_own_error(verdict: PartVerdict, aside: Collection[str]) -> PartVerdict:
     if part is not None and verdict.outcome == "explained":
         return uneven_noise.doubting(verdict, part, aside)
     slight = verdict.outcome == "unknown" and not verdict.effects and small(search)
-    if part is None or not (slight or verdict.outcome in WITHOUT_GAP):
+    if part is None or verdict.drifting or not (slight or verdict.outcome in WITHOUT_GAP):
         return verdict
     own = (
         outliers.own_error(verdict, part)
@@ -299,6 +300,15 @@ def doubted(verdicts: Sequence[PartVerdict]) -> list[str]:
         "other sensor of its laboratory has such noise. Readings at rest would tell."
         for verdict in verdicts
         if verdict.doubted
+    ]
+
+
+def drifting(verdicts: Sequence[PartVerdict]) -> list[str]:
+    """A sentence for each reading whose zero drifts by less than can be seen."""
+    return [
+        f"The zero of {signal} drifts by less than can be seen beside its noise, which counts as no gap."
+        for verdict in verdicts
+        for signal in verdict.drifting
     ]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnosis.findings.certainty.costs import certainty, farthest, odds, over, strain
 from diagnosis.findings.certainty.other_causes import EITHER, other_causes, small, swings
+from diagnosis.findings.sensors.drifting_zeros import drifting_zeros
 from diagnosis.findings.sensors.noise_levels import unproven
 from diagnosis.findings.sensors.one_motion import one_motion
 from diagnosis.findings.sensors.own_reading import machine_alone, of_column
@@ -60,6 +61,7 @@ class PartVerdict:
     equivalent: tuple[tuple[str, ...], ...]
     joined: Search | None = None  # in all recordings, where several were searched at once
     doubted: str = ""  # the reading of which the gap might also be slow noise, empty for none
+    drifting: tuple[str, ...] = ()  # the readings whose zeros drift, where that is all of the gap
     own: OwnError | None = None  # the gap, where it is an error of one reading by itself
 
     @property
@@ -76,6 +78,9 @@ class PartVerdict:
 def judge(search: Search) -> PartVerdict:
     """The verdict on a part."""
     less, name = under_less_noise(search)
+    if drifting := drifting_zeros(search):
+        bare = replace(search, chosen=search.commissioned, alternatives=())
+        return PartVerdict(bare, "tolerances", 1.0, (), (), drifting=drifting)
     if not search.chosen.names:
         outcome = without_effects(less)
         return PartVerdict(less, outcome, 1.0, (), (), doubted=name if outcome == "unknown" else "")

@@ -34,6 +34,9 @@ REPEATED, STOOD = 1e-3, 0.5
 # Step over the range of a channel, times that of the other channels, from which on it rounds by itself. Decimal digits
 # differ between channels by up to a factor of ten, ranges of converters by two to four.
 UNLIKE = 5.0
+# Times its noise, from which on a reading's step counts as coarse: converters are chosen with steps of about their
+# sensors' noise, and one of twice the noise makes it a sixth louder.
+COARSER = 2.0
 SAME = 1.01  # factor within which two steps are the same one
 DIGITS = 7  # significant digits up to which values count as printed text
 
@@ -217,7 +220,7 @@ def findings(
     coarse = coarsest(record, rounded) | stated_steps(record)
     for name, step in rounded.items():
         expected = noise_of.get(name, 0.0) * usual
-        if step > SAME * max(expected, coarse.get(name, 0.0)):
+        if step > max(COARSER * expected, SAME * coarse.get(name, 0.0)):
             size = step / np.sqrt(12.0) / expected if expected > 0.0 else 0.0
             bounds = ((1.0 - STEP_ERROR) * step, (1.0 + STEP_ERROR) * step)
             result.append(SensorFinding(effect_on(record, name, "quantization"), "step", step, bounds, size))
