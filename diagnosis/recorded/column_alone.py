@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
+from common.recording.imported import NOTHING_STATED, ImportedChannel
 from diagnosis.recorded.laboratory import RecordedLaboratory
-from diagnosis.recorded.nuisances import nuisances
+from diagnosis.recorded.nuisances import channels, nuisances
 from diagnosis.recorded.parts import Measured, cut, of_sites, outputs
 from diagnosis.recorded.record import Record
 from diagnosis.recorded.smoothed import smoothed
@@ -25,16 +30,47 @@ class ColumnAlone(Measured):
         reading = record.signals[lab.signal(displacement)]
         self.inputs = reading if record.static else smoothed(reading)  # rows have no frequencies
         self.measured, self.present = outputs(record, self.signals)
+        self.interval = record.plan.test.interval
+        stated = dict(zip(lab.kind.channels.names, channels(record.stated, lab), strict=True))
+        motion, self.channel = apart(stated[displacement], stated[force])
+        self.static = record.static
+        if not self.static:  # rows have no frequencies
+            self.measured = motion.through(self.measured[:, 0], self.interval)[:, None]
         machine = next(item for item in lab.kind.machines(lab.plan) if item.site == "column")
         self.nuisances = nuisances(lab, machine.parameters)
         sites = (lab.site("column"), lab.site(f"sensor.{force}"))
         self.candidates = of_sites(record, sites, lab.plan)
 
     def predict(self, system: System) -> Array:
-        """Force readings."""
-        return replay.column(system, self.inputs)[:, None]
+        """Force readings, behind the filters of both channels as `measured` is."""
+        force = replay.column(system, self.inputs)
+        if self.static or not np.isfinite(force).all():
+            return force[:, None]
+        return self.channel.through(force, self.interval)[:, None]
+
+    @property
+    def passes(self) -> Array:
+        """Frequency (1,) up to which the force's channel passes noise, Hz."""
+        return np.array([math.inf if self.static else self.channel.passes])
 
     def first(self, ticks: int) -> ColumnAlone:
         """The column over the first ticks."""
         result: ColumnAlone = cut(self, ticks, self.inputs[:ticks])
         return result
+
+
+def apart(motion: ImportedChannel, force: ImportedChannel) -> tuple[ImportedChannel, ImportedChannel]:
+    """What the force has to pass beside what the motion passed, and the prediction: nothing where both are the same.
+
+    The force that a filtered motion makes has passed the motion's filter. So the force that was measured passes that
+    one as well, and the prediction that of the force, which a nonlinear law changes in details only.
+    """
+
+    def chain(channel: ImportedChannel) -> ImportedChannel:
+        return ImportedChannel(
+            channel.filter, channel.delay, high_pass=channel.high_pass, average=channel.average
+        )
+
+    if chain(motion) == chain(force):
+        return NOTHING_STATED, NOTHING_STATED
+    return chain(motion), chain(force)

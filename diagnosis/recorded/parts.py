@@ -307,13 +307,18 @@ class LaboratoryPart:
         free = self.lab.kind.drifts(self.lab.plan)
         if not free and abs(motion[0]) <= UNREST * float(np.max(np.abs(motion))):
             return None
-        length = max(4 * REACH, round(PIECE / interval)) if free else motion.size
+        length = self._piece if free else motion.size
         rows = []
         for tick in range(0, motion.size - 2 * REACH, length):
             window = np.arange(max(0, tick - REACH), tick + REACH + 1)
             cubic = np.polynomial.polynomial.polyfit((window - tick) * interval, motion[window], 3)
             rows.append((tick, cubic[0], cubic[1]))
         return np.array(rows)
+
+    @property
+    def _piece(self) -> int:
+        """Ticks of a piece of a motion without a restoring force."""
+        return max(4 * REACH, round(PIECE / self._interval))
 
     def rested(self, system: System) -> bool:
         """Whether a replay from rest is nearer to the motion than one from the state that was read.
@@ -352,6 +357,21 @@ class LaboratoryPart:
             return self.replaced(nuisances=(*self.nuisances, *delays), retimed=retimed)
         gain = LoggedReadings("gain", CALIBRATED, self.lab, self.lab.kind.channels.names)
         return self.replaced(nuisances=(*self.nuisances, *delays, gain), retimed=retimed)
+
+    def another_test(self, inputs: dict[str, Array]) -> LaboratoryPart:
+        """The same laboratory from rest on under other commands (ticks,), with readings of zero.
+
+        A motion without a restoring force is cut into pieces there as well, of which each begins at rest.
+        """
+        ticks = max(values.size for values in inputs.values())
+        starts = np.arange(0, ticks, self._piece) if self.freed >= 0 else np.zeros(0)
+        return self.replaced(
+            inputs=inputs,
+            measured=np.zeros((ticks, len(self.signals))),
+            present=np.broadcast_to(self.present.any(axis=0), (ticks, len(self.signals))),
+            anew=np.column_stack([starts, np.zeros((starts.size, 2))]) if self.freed >= 0 else None,
+            _start=0.0,
+        )
 
     def replaced(self, **fields: Any) -> LaboratoryPart:
         """The same laboratory in another test: other inputs, or other readings."""

@@ -12,9 +12,9 @@ from models.registry import Array
 ROUNDING = 4.0 * float(np.finfo(np.float64).eps)  # of a value, relative to the largest
 COARSE = 1e3  # roundings that a step must exceed
 # Significant digits of a text that steps of a converter may be looked for behind. Of such a text: the most that a value
-# errs by, in units of the last digit of 0.1 of the largest one, and how many times that a step must exceed. Levels that
-# it must have, as a few of them have a common divisor by chance, and the share of samples that may have a level of their
-# own, as free floats do.
+# errs by, in units of the last digit of a tenth of the largest one, and how many times that a step must exceed. Levels
+# that it must have, as a few of them have a common divisor by chance, and the share of samples that may have a level of
+# their own, as free floats do.
 DIGITS, LAST_DIGIT, COARSE_PRINTED, FEWEST, RECURRING = (12, 10, 9, 8, 7, 6), 5.0, 50.0, 24, 0.5
 # Levels from which on they tell of a step: the two gaps between three free floats have no common divisor.
 LEVELS = 3

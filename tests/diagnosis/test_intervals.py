@@ -9,17 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm, t
 
-from diagnosis.findings.certainty.intervals import (
-    FOREIGN,
-    Spread,
-    between_formulas,
-    between_solutions,
-    covariance,
-    intervals,
-    mixed,
-    refined,
-    spread,
-)
+from diagnosis.findings.certainty.covariances import FOREIGN, Spread, between_solutions, covariance, spread
+from diagnosis.findings.certainty.intervals import between_formulas, intervals, mixed, refined
 from diagnosis.findings.verdict import judge
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit

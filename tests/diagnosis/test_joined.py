@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from diagnosis.findings.certainty.intervals import intervals, refined, spread
+from diagnosis.findings.certainty.covariances import spread
+from diagnosis.findings.certainty.intervals import intervals, refined
 from diagnosis.findings.logged.building import verdict_on
 from diagnosis.findings.verdict import PartVerdict
 from diagnosis.fits import fitting, residuals

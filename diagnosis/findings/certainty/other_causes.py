@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 
+from diagnosis.findings.certainty.covariances import FOREIGN, between_solutions, spread
 from diagnosis.findings.sensors.one_motion import one_place
 from diagnosis.findings.sensors.own_reading import errors, gives_energy, of_column
 from diagnosis.fits import hypothesis
@@ -14,6 +16,7 @@ from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
 from diagnosis.fits.search import Search
 from diagnosis.fits.unexplained import foresees, model_error
+from diagnosis.fits.worth import changes
 from diagnosis.recorded.joined import column_of, laboratory_of
 from diagnosis.recorded.parts import MODEL_ERROR
 
@@ -37,6 +40,11 @@ def other_causes(search: Search) -> Iterator[str]:
             "Something else as small may look the same."
         )
         return
+    for name in of_no_size(fit):
+        yield (
+            f"The interval of {name} also holds none of it: what it explains may have another cause, or be an error of "
+            "the model."
+        )
     for name in errors(fit):
         yield (
             f"{name} stands beside an effect that shows in this reading alone. Another law of the machine may look the "
@@ -72,6 +80,25 @@ def other_causes(search: Search) -> Iterator[str]:
             f"The offsets of {described(fit)} follow from one another as where a machine stands elsewhere, such as "
             "behind a valve that opens later on one side: these signals cannot tell them apart."
         )
+
+
+def of_no_size(fit: Fit) -> list[str]:
+    """The effects of a fit that show for little and of which it cannot tell that there is any.
+
+    Each of their parameters, shapes aside, is nearer to where it does nothing than its interval reaches.
+    """
+    faint = [name for name, size in zip(fit.names, changes(fit), strict=True) if size.max() < fit.data.group]
+    if not faint:
+        return []
+    problem, sure = Problem(fit.data, fit.values), spread(fit)
+    places = problem.place(fit.values, fit.z)
+    near: dict[str, list[bool]] = {}
+    for place, item in enumerate(problem.frees, start=fit.z.size):
+        parameter = item.parameter
+        if item.effect in faint and not (parameter.shape or math.isinf(parameter.null)):
+            half = math.hypot(FOREIGN * sure.half(place), between_solutions(fit))
+            near.setdefault(item.effect, []).append(abs(places[place] - item.inward(parameter.null)) < half)
+    return [name for name, yes in near.items() if all(yes)]
 
 
 def may_relax(fit: Fit) -> str:

@@ -11,7 +11,7 @@ from scipy.signal import hilbert
 
 from common.reality.spread import ByRole, SeenRange, Spread, UncertainParameter
 from common.roles import MASTER
-from diagnosis.findings.certainty.intervals import covariance
+from diagnosis.findings.certainty.covariances import covariance
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.gaps import RecordingGaps, judging
 from diagnosis.findings.verdict import PartVerdict

@@ -95,7 +95,10 @@ def played(data: Data, truth: Array) -> Data:
 
 
 def menu(data: Data) -> list[tuple[str, Data]]:
-    """Tests to choose from in a part's laboratory: the same motion at other scales, sines, and slow cycles."""
+    """Tests to choose from in a part's laboratory: the same motion at other scales, sines, and slow cycles.
+
+    A device that did not move is left out, since nothing tells how far it can.
+    """
     part = data.part
     if not isinstance(part, LaboratoryPart):
         return []
@@ -104,7 +107,9 @@ def menu(data: Data) -> list[tuple[str, Data]]:
     t = np.arange(ticks) * interval
     tests: list[tuple[str, dict[str, Array]]] = []
     for key, device in part.devices.items():
-        reached = float(np.max(np.abs(part.inputs[key]), initial=0.0)) or 1.0
+        reached = float(np.max(np.abs(part.inputs[key]), initial=0.0))
+        if reached == 0.0:
+            continue
         for factor in (0.5, 2.0):
             tests.append(
                 (
@@ -123,7 +128,7 @@ def menu(data: Data) -> list[tuple[str, Data]]:
         tests.append(
             (f"slow cycles (0.1 Hz, {2 * reached:.3g} {part.units[key]}) on the {device}", {key: slow})
         )
-    return [(name, replace(data, part=part.replaced(inputs=inputs))) for name, inputs in tests]
+    return [(name, replace(data, part=part.another_test(inputs))) for name, inputs in tests]
 
 
 def sentence(found: list[ChosenTest], describe: Callable[[str], str] = str) -> str:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from common.recording.imported import ImportedChannel, LoggerFilter
-from diagnosis.findings.certainty.intervals import FOREIGN, covariance
+from diagnosis.findings.certainty.covariances import FOREIGN, covariance
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged import delays, means
 from diagnosis.findings.sensors import readings

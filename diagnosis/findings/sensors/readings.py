@@ -10,6 +10,7 @@ import numpy as np
 
 from diagnosis.fits.residuals import STEPPING, Data
 from diagnosis.recorded.building.building import Building
+from diagnosis.recorded.parts import FINE_ERROR
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import quantum, quantum_between
 from models.registry import Array
@@ -206,7 +207,8 @@ def findings(
     """Sensors that round coarsely, and sensors that are far noisier than planned and than the other ones.
 
     `rounded` are the steps of `steps` that a sensor may have made; `white` is the rms noise. Where a logger recorded
-    (`logged`), noise as small as that of its converter is the logger's.
+    (`logged`), noise as small as that of its converter is the logger's. Steps that err by less than two very good
+    solutions of a model differ are those of a text.
     """
     noise_of = record.planned_noise
     # A value that is only stated has no noise.
@@ -220,7 +222,8 @@ def findings(
     coarse = coarsest(record, rounded) | stated_steps(record)
     for name, step in rounded.items():
         expected = noise_of.get(name, 0.0) * usual
-        if step > max(COARSER * expected, SAME * coarse.get(name, 0.0)):
+        seen = FINE_ERROR * float(np.std(record.signals[name])) * math.sqrt(12.0)
+        if step > max(COARSER * expected, SAME * coarse.get(name, 0.0), seen):
             size = step / np.sqrt(12.0) / expected if expected > 0.0 else 0.0
             bounds = ((1.0 - STEP_ERROR) * step, (1.0 + STEP_ERROR) * step)
             result.append(SensorFinding(effect_on(record, name, "quantization"), "step", step, bounds, size))
