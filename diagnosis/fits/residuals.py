@@ -180,6 +180,11 @@ class Data:
         return measured_by(replace(self, erring=FINE_ERROR), self.white)
 
     @property
+    def good(self) -> Array:
+        """Rms (signals,) that a good solution of the model may err by, with what the motion that drives it errs by."""
+        return np.asarray(np.hypot(self.erring * self.part.level, self.part.blurred))
+
+    @property
     def beside(self) -> Array:
         """Variance (signals,) that residuals may have beside the noise: of what a model errs by, and of rounding."""
         return np.asarray(self.sigma**2 - self.white**2)
@@ -333,7 +338,7 @@ def measured_by(data: Data, white: Array) -> Data:
     A reading that moves over coarse steps errs by a twelfth of their square, as by white noise. One that rests on a few
     of them errs by as much, and by the same for long.
     """
-    least = (EXACT if data.part.exact else data.erring) * data.part.level + 1e-15
+    least = (EXACT * data.part.level if data.part.exact else data.good) + 1e-15
     coarse = np.flatnonzero(data.rounded > STEPPING * white)
     lasting = {int(place): steps_last(data, int(place)) for place in coarse}
     still = [place for place, groups in lasting.items() if np.mean(groups > LONGEST_STEP) > 1.0 - MOVING]

@@ -89,7 +89,7 @@ def within_bounds(rows: Array, wanted: Array, low: Array, high: Array) -> Array:
 
     Mostly it is the one without bounds, for which SciPy's function for bounds takes ten times as long.
     """
-    found = np.linalg.lstsq(rows, wanted, rcond=None)[0]
+    found = np.asarray(np.linalg.lstsq(rows, wanted, rcond=None)[0], dtype=np.float64)
     if np.all(found >= low) and np.all(found <= high):
         return found
     return np.asarray(lsq_linear(rows, wanted, bounds=(low, high), method="bvls").x)

@@ -74,7 +74,7 @@ def model_error(fit: Fit) -> Array:
     """What two good solutions of one model may differ by, (signals,) over σ; zero where the part is exact."""
     if fit.data.part.exact:
         return np.zeros(fit.data.sigma.size)
-    return np.asarray(BOTH * fit.data.erring * fit.data.part.level / fit.data.sigma)
+    return np.asarray(BOTH * fit.data.good / fit.data.sigma)
 
 
 def leaves(fit: Fit, allowed: Array | None = None) -> bool:

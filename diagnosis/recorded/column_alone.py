@@ -11,7 +11,8 @@ from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import channels, nuisances
 from diagnosis.recorded.parts import Measured, cut, of_sites, outputs
 from diagnosis.recorded.record import Record
-from diagnosis.recorded.smoothed import smoothed
+from diagnosis.recorded.smoothed import smoothed, without_small_turns
+from diagnosis.signals.noise import quantum
 from loop import replay
 from models.registry import Array
 from models.system import System
@@ -28,13 +29,20 @@ class ColumnAlone(Measured):
         displacement, force = lab.kind.channels.position, lab.kind.channels.force
         self.signals: tuple[str, ...] = (lab.signal(force),)
         reading = record.signals[lab.signal(displacement)]
-        self.inputs = reading if record.static else smoothed(reading)  # rows have no frequencies
         self.measured, self.present = outputs(record, self.signals)
         self.interval = record.plan.test.interval
         stated = dict(zip(lab.kind.channels.names, channels(record.stated, lab), strict=True))
         motion, self.channel = apart(stated[displacement], stated[force])
         self.static = record.static
-        if not self.static:  # rows have no frequencies
+        if self.static:  # rows have no frequencies
+            step = max(quantum(reading), stated[displacement].resolution)
+            error = math.hypot(
+                record.planned_noise.get(lab.signal(displacement), 0.0), step / math.sqrt(12.0)
+            )
+            self.inputs = without_small_turns(reading, error)
+            self.blurred = np.array([lab.plan.column.stiffness * error])
+        else:
+            self.inputs = smoothed(reading)
             self.measured = motion.through(self.measured[:, 0], self.interval)[:, None]
         machine = next(item for item in lab.kind.machines(lab.plan) if item.site == "column")
         self.nuisances = nuisances(lab, machine.parameters)

@@ -41,6 +41,9 @@ class JoinedPart:
         self.name, self.role, self.signals = first.name, first.role, first.signals
         self.nuisances, self.candidates, self.exact = first.nuisances, first.candidates, first.exact
         self.retimed = any(piece.retimed for piece in self.pieces)
+        self.blurred = np.max(
+            [np.broadcast_to(piece.blurred, len(self.signals)) for piece in self.pieces], axis=0
+        )
         self.measured = np.concatenate([piece.measured for piece in self.pieces])
         self.present = np.concatenate([piece.present for piece in self.pieces])
 

@@ -71,6 +71,8 @@ class Part(Protocol):
     measured: Array  # (ticks, signals)
     present: Mask  # (ticks, signals)
     exact: bool  # computed, not measured: free of noise
+    # (signals,) rms error that a prediction has because a measured motion that drives the part has one; 0 for none
+    blurred: Array | float
     retimed: bool  # whether readings were moved in time, by what is known of a logger to some ten µs only
 
     @property
@@ -133,6 +135,7 @@ class Measured:
 
     measured: Array
     retimed = False
+    blurred: Array | float = 0.0
 
     @property
     def level(self) -> Array:
@@ -149,6 +152,7 @@ class LaboratoryPart:
     """A laboratory replayed from its recorded commands."""
 
     exact = False
+    blurred: Array | float = 0.0
     played: tuple[tuple[System, Array], ...] = ()  # systems with what they did, the newest last
     curved: Array | None = None  # what `bends` gives
 

@@ -1,13 +1,16 @@
-"""A measured motion without the white noise of its sensor at frequencies at which the motion has none.
+"""A measured motion without the noise of its sensor, where that would make forces that the specimen did not have.
 
 A dashpot or a mass that is driven by a reading multiplies the reading's noise by frequency: 3 µm at 1024 Hz are 300 N
-of 150 kN·s/m, which the force that was measured does not have.
+of 150 kN·s/m. A hysteretic law that is driven by the rows of a static test turns back at every row that noise moved
+back, and forgets force.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
-from scipy import fft
+from scipy import fft, optimize
 
 from models.registry import Array
 
@@ -16,6 +19,8 @@ BAND = 64  # lines of a spectrum whose mean square is compared with the noise
 MOVING = 1.75
 MEDIAN = 0.4549  # of the square of a standard normal number
 UPPER = 0.5  # share of all frequencies of which the noise is told, and which motion must leave free
+# Standard deviations of noise, by which two rows of 10 000 differ at most: a smaller turn may be noise.
+TURN = 8.0
 FADE = 1.25  # times the highest frequency of the motion, up to which a reading fades away
 
 
@@ -36,3 +41,40 @@ def smoothed(reading: Array) -> Array:
     fading = np.clip((places - highest) / ((FADE - 1.0) * max(highest, 1)), 0.0, 1.0)
     lines *= 0.5 * (1.0 + np.cos(np.pi * fading))
     return np.asarray(fft.idct(lines, norm="ortho"))
+
+
+def without_small_turns(path: Array, error: float) -> Array:
+    """A path (n,) that rises or falls all the way between turns that are larger than its rms error makes them.
+
+    Between two turns it is the monotone path that is nearest to the rows (isotonic regression, R. E. Barlow et al.,
+    Statistical inference under order restrictions (1972)). A path without smaller turns stays as it is.
+    """
+    borders = turns(path, TURN * error)
+    result = path.copy()
+    for begin, end in pairwise(borders):
+        rises = bool(path[end] >= path[begin])
+        result[begin : end + 1] = optimize.isotonic_regression(path[begin : end + 1], increasing=rises).x
+    return result
+
+
+def turns(path: Array, least: float) -> list[int]:
+    """Places of a path's (n,) first and last rows, and of the turns after which it goes back by more than `least`."""
+    places, way, far, back = (
+        [0],
+        0,
+        0,
+        0,
+    )  # way: 1 where it rises, −1 where it falls, 0 where neither is known
+    for place, value in enumerate(path.tolist()):
+        if way == 0:
+            far, back = (place if value > path[far] else far), (place if value < path[back] else back)
+            if path[far] - path[back] > least:
+                way, first = (1, back) if far > back else (-1, far)
+                places += [first] if first > 0 else []
+                far = place
+        elif way * (value - path[far]) > 0.0:
+            far = place
+        elif way * (path[far] - value) > least:
+            places.append(far)
+            way, far = -way, place
+    return [*places, len(path) - 1] if places[-1] < len(path) - 1 else places

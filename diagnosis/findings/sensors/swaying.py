@@ -86,7 +86,7 @@ def own_error(verdict: PartVerdict, part: LaboratoryPart) -> OwnError | None:
     """The share of the motion that changes in time of the reading that shows it most."""
     data = verdict.search.data
     found = sways(verdict.search.chosen)
-    least = np.maximum(MATERIAL, BOTH * data.fine.erring * data.part.level / data.sigma)
+    least = np.maximum(MATERIAL, BOTH * data.fine.good / data.sigma)
     smooth = data.rounded <= ROUNDED * data.white
     seen = [
         place
