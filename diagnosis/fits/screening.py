@@ -14,7 +14,7 @@ from diagnosis.fits.fitting import NEAR, Fit
 from diagnosis.fits.laws.specimen import within
 from diagnosis.fits.scales import LARGEST_START, Scales
 from diagnosis.fits.threads import each
-from laboratories.effects.effect import Effect
+from laboratories.effects.effect import Effect, Parameter
 from models.registry import Array
 
 # Of a start whose size must stay as it is: about as much as a fit then moves its shape.
@@ -151,22 +151,28 @@ def at_rest(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect
 
 
 def slightly_bent(effect: Effect, plane: Plane, scales: Scales) -> list[ScreenedEffect]:
-    """For an effect that bends a reading near its level the most promising sharpness, where it does what is left.
+    """For an effect that bends a signal near its level the most promising sharpness, where it does what is left.
 
-    Far below the level a reading x lacks x·(x/level)ⁿ/n, so that a fine sensor shows levels of many times what it
-    reaches, and no straight line leads there from usual ones.
+    Far below the level a signal x lacks x·(x/level)ⁿ/n, so that fine sensors show levels of many times what is reached,
+    and no straight line leads there from usual ones.
     """
-    levels = [item for item in effect.parameters if item.bends_by]
-    shapes = [item for item in effect.parameters for level in levels if item.name == level.bends_by]
     fit, found = plane.fit, []
     left = float(np.linalg.norm(fit.reduced))
-    if not shapes or not left or not (sizes := scales.sizes(effect, levels[0])):
-        return []
-    for sharpness in shapes[0].sizes:
-        start = effect.values({levels[0].name: max(sizes), shapes[0].name: sharpness})
-        moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: start}))
-        farther = float(np.linalg.norm(moved - fit.reduced)) / left
-        if farther > 0.0:
-            start[levels[0].name] = within(levels[0], max(sizes) * farther ** (1.0 / sharpness))
-            found.append(look_from(effect, start, plane, scales)[0])
+    for level in effect.parameters if left else ():
+        sizes = scales.sizes(effect, level) if level.bends_by else []
+        for start in bent_starts(effect, level, max(sizes)) if sizes else ():
+            moved = fit.data.reduced(hypothesis.lay(fit.data, fit.z, fit.values | {effect.name: start}))
+            farther = float(np.linalg.norm(moved - fit.reduced)) / left
+            if farther > 0.0:
+                start[level.name] = within(level, max(sizes) * farther ** (1.0 / start[level.bends_by]))
+                found.append(look_from(effect, start, plane, scales)[0])
     return sorted(found, key=lambda item: -item.gain)[:1]
+
+
+def bent_starts(effect: Effect, level: Parameter, size: float) -> list[dict[str, float]]:
+    """Parameters of an effect at a size of its level with each sharpness, under the first law that has one."""
+    shape = next(item for item in effect.every if item.name == level.bends_by)
+    places = [place for place, law in enumerate(effect.laws) if level.bends_by in law.shapes]
+    base = effect.values({level.name: size})
+    base = effect.under(places[0], base) if places else base
+    return [base | {shape.name: sharpness} for sharpness in shape.sizes]
