@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.findings.certainty.costs import certainty, farthest, odds, over, strain
-from diagnosis.findings.certainty.other_causes import EITHER, other_causes, small, swings
+from diagnosis.findings.certainty.other_causes import EITHER, of_no_size, other_causes, small, swings
 from diagnosis.findings.sensors.drifting_zeros import drifting_zeros
 from diagnosis.findings.sensors.noise_levels import unproven
 from diagnosis.findings.sensors.one_motion import one_motion
@@ -81,6 +81,10 @@ def judge(search: Search) -> PartVerdict:
     if drifting := drifting_zeros(search):
         bare = replace(search, chosen=search.commissioned, alternatives=())
         return PartVerdict(bare, "tolerances", 1.0, (), (), drifting=drifting)
+    if search.chosen.names and set(of_no_size(search.chosen)) == set(search.chosen.names):
+        bare = replace(search, chosen=search.commissioned, alternatives=())
+        if (outcome := without_effects(bare)) != "unknown":
+            return PartVerdict(bare, outcome, 1.0, (), ())
     if not search.chosen.names:
         outcome = without_effects(less)
         return PartVerdict(less, outcome, 1.0, (), (), doubted=name if outcome == "unknown" else "")

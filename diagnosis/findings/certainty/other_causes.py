@@ -25,6 +25,7 @@ from diagnosis.recorded.parts import MODEL_ERROR
 EITHER = 0.5
 MANY = 5  # free parameters of an effect, from which on it may follow nearly anything
 TOLD = 0.9  # share of a parameter's standard deviation without data that is left where these tell it
+FAINT = 3.0  # trace over noise of an effect, below which its interval may hold none of it
 FORGOTTEN = 3.0  # time constants, within which a high-pass has forgotten 95 %
 
 
@@ -87,7 +88,8 @@ def of_no_size(fit: Fit) -> list[str]:
 
     Each of their parameters, shapes aside, is nearer to where it does nothing than its interval reaches.
     """
-    faint = [name for name, size in zip(fit.names, changes(fit), strict=True) if size.max() < fit.data.group]
+    sizes = zip(fit.names, changes(fit), strict=True)
+    faint = [name for name, size in sizes if size.max() < FAINT**2 * fit.data.group]
     if not faint:
         return []
     problem, sure = Problem(fit.data, fit.values), spread(fit)
