@@ -119,6 +119,7 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: Imp
             "units": found.units,
             "gaps": found.gaps,
             "ends": found.ends,
+            "left_out": found.left_out,
             "start": told.begins,
             "at_rest": [*told.rest],
             "ground_unread": told.unread,
@@ -158,6 +159,8 @@ def said_of_time(found: OnTicks, told: ImportRemarks) -> Iterator[str]:
     if any(found.ends):
         before, behind = found.ends
         yield f"left out, as not all columns have begun or go on there: {before} rows at the begin, {behind} at the end"
+    if found.left_out:
+        yield f"left out, as a column has no number there: {found.left_out} rows"
     if found.gaps:
         begin, end = max(found.gaps, key=lambda gap: gap[1] - gap[0])
         more = f", and in {len(found.gaps) - 1} shorter gaps" if found.gaps[1:] else ""

@@ -76,15 +76,15 @@ class SignalSource:
     """Where one of our signals comes from: ours = scale · theirs + offset, or a known value."""
 
     column: str = key("name of a column in the data", default="")
-    scale: float = key("factor", default=1.0)
-    offset: float = key("offset", default=0.0)
-    unit: str = key("unit of the column, instead of a scale", default="")
+    scale: float = key("factor; −1 beside a unit, where the reading has the opposite sign", default=1.0)
+    unit: str = key("unit of the column, instead of a factor", default="")
     delay: float = key("time by which the logger recorded it too late", default=0.0, unit="s")
     average: float = key(
         "time up to its row over which each reading is a mean", default=0.0, least=0.0, unit="s"
     )
     high_pass: float = key("corner of its amplifier's high-pass", default=0.0, least=0.0, unit="Hz")
     calibration: float = key("relative tolerance of its gain", default=0.0, least=0.0, most=1.0)
+    offset: float = field(default=0.0, metadata=key("offset", default=0.0).metadata)
     resolution: float = field(default=0.0, metadata=key("step of the readings", default=0.0).metadata)
     filter: LoggerFilter | None = field(default=None, metadata=key("low-pass filter", default=0.0).metadata)
     value: float | None = field(default=None, metadata=key("known value", default=0.0).metadata)
@@ -98,7 +98,7 @@ class SignalSource:
         return self.delay != 0.0 or self.average > 0.0
 
 
-APART = ("value", "filter", "resolution")  # keys that need their own check
+APART = ("value", "filter", "resolution", "offset")  # keys that need their own check
 FORM = ("separator", "decimal", "skip_rows")  # keys of a text file, recognised where they are left out
 OUR_OWN = ("scaled",)  # fields that are set here and cannot be given as keys
 
@@ -113,6 +113,8 @@ class ImportTable:
     rate: float = key("samples per second, instead of a column of time", default=0.0, above=0.0, unit="Hz")
     start: float = key("time in the data from which on it is read", default=0.0, unit="s")
     stop: float = key("time in the data up to which it is read", default=0.0, unit="s")
+    first_row: int = key("first row that is read, of a static test, counted from 1", default=0, least=1)
+    last_row: int = key("last row that is read, of a static test", default=0, least=1)
     static: bool = key("each row is one tick, whatever its time", default=False)
     separator: str = key("character between columns", default="")
     decimal: str = key("decimal sign", default=".", choices=(".", ","))
@@ -145,6 +147,11 @@ class ImportMap:
     def rate(self) -> float:
         """Samples per second, 0 where a column holds the time."""
         return self.table.rate
+
+    @property
+    def span(self) -> slice:
+        """The rows of a static test that are read."""
+        return slice(max(self.table.first_row - 1, 0), self.table.last_row or None)
 
     @property
     def static(self) -> bool:
@@ -187,7 +194,12 @@ def load_map(path: Path) -> ImportMap:
 def check(path: Path, table: ImportTable, start: float | None, stop: float | None) -> None:
     """Raise InputError for keys that contradict each other."""
     if (start is not None or stop is not None) and not (table.time or table.rate):
-        raise InputError(f'{path}: start and stop are times: give time = "name of the time column" too.')
+        raise InputError(
+            f'{path}: start and stop are times: give time = "name of the time column" too, or first_row and last_row '
+            "of a static test."
+        )
+    if (table.first_row or table.last_row) and not table.static:
+        raise InputError(f"{path}: first_row and last_row are for static = true: give start and stop, in s.")
     if start is not None and stop is not None and not stop > start:
         raise InputError(f"{path}: stop is {stop:g} s, but must be after start, which is {start:g} s.")
 
@@ -223,10 +235,14 @@ def source(path: Path, name: str, entry: Any, known: Known) -> SignalSource:
             if word in values:
                 raise PlanError(f"Unknown key '{word}' in [{where}]: {nearest(word, APART)}")
         found = fill(SignalSource, values, where)
-        if "unit" in values and "scale" in values:
-            raise PlanError(f"'{name}' in [signals] has both a unit and a scale: give one of them.")
-        scale = in_unit(found.unit, row, name) if found.unit else found.scale
+        if "unit" in values and "scale" in values and found.scale != -1.0:
+            raise PlanError(
+                f"'{name}' in [signals] has both a unit and a scale: give one of them, or scale = -1 beside the unit "
+                "for a reading of the opposite sign."
+            )
+        scale = in_unit(found.unit, row, name) * found.scale if found.unit else found.scale
         step, low_pass = stated(apart, row, where)
+        offset = as_type("float", apart.get("offset", 0.0), f"offset in [{where}]", row.unit)
     except (PlanError, ValueError) as error:
         raise InputError(f"{path}: {error}") from None
     value = apart.get("value")
@@ -237,6 +253,7 @@ def source(path: Path, name: str, entry: Any, known: Known) -> SignalSource:
     return replace(
         found,
         scale=scale,
+        offset=offset,
         resolution=step,
         filter=low_pass,
         value=None if value is None else float(value),

@@ -29,6 +29,7 @@ from rths.examine.importing.time_base import (
     time_base,
     time_unit,
     without_ends,
+    without_holes,
 )
 
 GROUND = "ground_acceleration"  # the signal that the plan knows as well
@@ -51,10 +52,9 @@ class OnTicks:
     begin: float = 0.0  # s, the time of the first row in the data
     gaps: tuple[tuple[float, float], ...] = ()  # s in the data's own time, between which rows are missing
     clock: ControllerClock | None = None  # of the controller, where what it holds tells it
-    ends: tuple[int, int] = (
-        0,
-        0,
-    )  # rows before the first and behind the last one in which every column began and ends
+    # rows before the first and behind the last one in which every column began and ends
+    ends: tuple[int, int] = (0, 0)
+    left_out: int = 0  # rows of a static test in which a column has no number
 
     @property
     def interpolated(self) -> list[str]:
@@ -112,10 +112,12 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
     theirs, rows = without_ends(theirs, rows, *ends)
     interval = mapping.plan.test.interval
     gaps: tuple[tuple[float, float], ...] = ()
-    begin = 0.0
+    begin, left_out = 0.0, 0
     if mapping.static:
-        t = np.arange(theirs.size, dtype=np.float64) * interval
-        theirs = t
+        read = np.count_nonzero(rows)
+        rows = without_holes(mapping, table, data, rows)
+        t = np.arange(np.count_nonzero(rows), dtype=np.float64) * interval
+        theirs, left_out = t, int(read - t.size)
     else:
         if not as_is:
             refuse_unit(mapping, theirs, data)
@@ -129,7 +131,7 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
     ticks = TickGrid(t, interval, clock)
     rate = 0.0 if mapping.static else rate_of(theirs)
     known, computed = lab_signals(mapping.plan), of_controller(mapping.plan)
-    found = OnTicks(t, {}, {}, {}, begin, gaps, clock, ends)
+    found = OnTicks(t, {}, {}, {}, begin, gaps, clock, ends, left_out)
     if mapping.time and not mapping.time_unit and time_unit(mapping, table) not in ("", "s"):
         found.units["time"] = time_unit(mapping, table)
     for name, source in mapping.signals.items():

@@ -61,16 +61,32 @@ def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, 
         raise InputError(
             f"{data}: the time in column '{mapping.time}' does not increase at row {row}.{hint if same else ''}"
         )
-    rows = np.ones(t.size, dtype=bool)
+    rows = np.zeros(t.size, dtype=bool)
+    rows[mapping.span] = True
     if mapping.start is not None:
         rows &= t >= mapping.start
     if mapping.stop is not None:
         rows &= t <= mapping.stop
     if np.count_nonzero(rows) < 2:
         raise InputError(
-            f"{data}: fewer than two rows lie between start and stop; its times go from {t[0]:g} to {t[-1]:g} s."
+            f"{data}: fewer than two rows lie between first_row and last_row; it has {t.size} rows."
+            if mapping.span != slice(0, None)
+            else f"{data}: fewer than two rows lie between start and stop; its times go from {t[0]:g} to {t[-1]:g} s."
         )
     return t[rows], rows
+
+
+def without_holes(
+    mapping: ImportMap, table: DataTable, data: Path, rows: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.bool_]:
+    """The rows of a static test that have a number in every column; all where more than a few have none.
+
+    A row there stands for itself, so that one of which a logger had no reading can be left out.
+    """
+    columns = [pick(table, source.column, data) for source in mapping.signals.values() if source.column]
+    whole = rows & np.all(np.isfinite(columns), axis=0)
+    lacking = np.count_nonzero(rows) - np.count_nonzero(whole)
+    return whole if lacking <= ENDS * np.count_nonzero(rows) else rows
 
 
 def outside(
