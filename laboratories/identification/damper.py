@@ -10,6 +10,7 @@ a measured force those intervals are infinite.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -39,6 +40,7 @@ WORST = 1e-9
 ROUNDS = (
     3  # of weighting both signals by their misfit; it ends earlier when the weights change by less than 10 %
 )
+STEPS = 40  # of a fit in each of these: near an exact solution friction goes on in ever smaller ones
 NAMES = ("mass", "damping", "stiffness", "motor_time_constant", "gain", "friction", "offset")
 UNITS = ("kg", "N·s/m", "N/m", "s", "", "N", "N")
 
@@ -66,9 +68,11 @@ class DamperRecord(NamedTuple):
 
 @jit
 def respond(
-    p: Array, interval: float, substeps: int, record: DamperRecord, begin: tuple[float, float]
+    p: Array, interval: float, substeps: int, record: DamperRecord, begin: tuple[float, float, float]
 ) -> None:
-    """Fill stroke (m) and force (N) of a record; `p` is in the order of NAMES, `begin` holds stroke and its rate (m/s).
+    """Fill stroke (m) and force (N) of a record from `begin`: stroke, its rate (m/s) and the motor's force (N).
+
+    `p` is in the order of NAMES.
 
     The method is Runge-Kutta's of fourth order; the motor's lag is exact for its held command, and the table's
     acceleration is linear between ticks.
@@ -78,7 +82,7 @@ def respond(
     h = interval / substeps
     creep = max(SLOWEST, abs(friction) * h / mass)
     fade = np.exp(-0.5 * h / lag) if lag > 0.0 else 0.0
-    x, v, u = begin[0], begin[1], 0.0
+    x, v, u = begin[0], begin[1], begin[2]
     for k in range(command.size):
         stroke[k] = x
         force[k] = stiffness * x + damping * v + friction * np.tanh(v / creep) - offset - u
@@ -107,12 +111,22 @@ def respond(
 
 
 def response(
-    values: Array, command: Array, ground: Array, interval: float, start: float = 0.0, rate: float = 0.0
+    values: Array,
+    command: Array,
+    ground: Array,
+    interval: float,
+    start: float = 0.0,
+    rate: float = 0.0,
+    motor: float = 0.0,
 ) -> tuple[Array, Array]:
-    """Stroke (m) and force (N), each (n,), for parameters (7,) in the order of NAMES."""
+    """Stroke (m) and force (N), each (n,), for parameters (7,) in the order of NAMES.
+
+    They begin at a stroke `start` (m), its `rate` (m/s) and a force of the `motor` (N).
+    """
     stroke, force = np.empty(command.size), np.empty(command.size)
     substeps = max(int(np.ceil(interval / SUBSTEP - 1e-9)), 1)
-    respond(values, interval, substeps, DamperRecord(command, ground, stroke, force), (start, rate))
+    begin = (start, rate, motor)
+    respond(values, interval, substeps, DamperRecord(command, ground, stroke, force), begin)
     return stroke, force
 
 
@@ -132,15 +146,43 @@ def anew(stroke: Array, interval: float) -> list[tuple[int, float, float]]:
 
 
 def in_pieces(
-    values: Array, command: Array, ground: Array, interval: float, begins: Sequence[tuple[int, float, float]]
+    values: Array,
+    command: Array,
+    ground: Array,
+    read: Array,
+    interval: float,
+    begins: Sequence[tuple[int, float, float]],
 ) -> tuple[Array, Array]:
-    """Stroke (m) and force (N), each (n,), simulated separately from each beginning."""
+    """Stroke (m) and force (N), each (n,), of a drive without a spring, simulated separately from each beginning.
+
+    A beginning is read from a few noisy samples only, so the stroke and the rate at it are taken with which the piece
+    fits the strokes `read` (n,) best.
+    """
+    mass, damping = float(values[0]), float(values[1])
+    motor = motor_forces(values, command, interval)
     ends = [*(tick for tick, _, _ in begins[1:]), command.size]
-    pieces = [
-        response(values, command[tick:end], ground[tick:end], interval, place, rate)
-        for (tick, place, rate), end in zip(begins, ends, strict=True)
-    ]
-    return np.concatenate([stroke for stroke, _ in pieces]), np.concatenate([force for _, force in pieces])
+    strokes, forces = [], []
+    for (tick, place, rate), end in zip(begins, ends, strict=True):
+        stroke, force = response(
+            values, command[tick:end], ground[tick:end], interval, place, rate, float(motor[tick])
+        )
+        fading = np.exp(-damping / mass * interval * np.arange(end - tick))
+        slid = np.concatenate([[0.0], np.cumsum(0.5 * interval * (fading[1:] + fading[:-1]))])
+        moved, faster = np.linalg.lstsq(
+            np.column_stack([np.ones(slid.size), slid]), read[tick:end] - stroke, rcond=None
+        )[0]
+        strokes.append(stroke + moved + faster * slid)
+        forces.append(force + damping * faster * fading)
+    return np.concatenate(strokes), np.concatenate(forces)
+
+
+def motor_forces(values: Array, command: Array, interval: float) -> Array:
+    """Force (n,) N of the motor at each tick, from rest on, under a command (n,) N that is held."""
+    from scipy import signal
+
+    lag, gain = float(values[3]), float(values[4])
+    fade = math.exp(-interval / lag) if lag > 0.0 else 0.0
+    return np.asarray(signal.lfilter([0.0, gain * (1.0 - fade)], [1.0, -fade], command))
 
 
 def least_squares(
@@ -155,14 +197,14 @@ def least_squares(
     """Parameters of damper and motor from stroke and force under a motor command or a moving table.
 
     `damper_command` (N, held from tick k to k + 1), `stroke` (m), `force` (N, on the table; None where not measured)
-    and `table_acceleration` (m/s²; None on a still table) have one value per tick of `interval` (s). `free` names what
-    is fitted, of mass (kg), damping (N·s/m), stiffness (N/m), motor_time_constant (s), gain, friction (N) and offset
-    (N, along +x); the others keep the `nominal` damper's values, gain 1, and no friction or offset, from which the fit
-    also starts. The initial state is fitted too; a drive whose nominal stiffness is 0 is simulated anew every second
-    from its measured motion. The output error is minimised, with both signals weighted by their scatter; intervals
-    follow from Jacobian and residual, corrected for the autocorrelation of each signal (`estimate.of_fit`). A friction
-    near zero may be estimated as negative within its interval. Parameters that the record cannot separate (mass and
-    gain without a force) have infinite intervals.
+    and `table_acceleration` (m/s²; None on a still table) have one value per tick of `interval` (s). `free` names
+    what is fitted, of mass (kg), damping (N·s/m), stiffness (N/m), motor_time_constant (s), gain, friction (N) and
+    offset (N, along +x); the others keep the `nominal` damper's values, gain 1, and no friction or offset, from which
+    the fit also starts. The initial state is fitted too; a drive whose nominal stiffness is 0 is simulated anew every
+    second, from the stroke and rate that fit its motion best. The output error is minimised, with both signals
+    weighted by their scatter; intervals follow from Jacobian and residual, corrected for the autocorrelation of each
+    signal (`estimate.of_fit`). A friction near zero may be estimated as negative within its interval. Parameters that
+    the record cannot separate (mass and gain without a force) have infinite intervals.
 
     Raises:
         InputError: too short, unequal lengths, not finite, no excitation, constant stroke, or an unknown
@@ -218,7 +260,7 @@ def fit(
         now = values.copy()
         now[places] = x[:-2] * scales[places]
         if begins:
-            return in_pieces(now, command, ground, interval, begins)
+            return in_pieces(now, command, ground, outputs[0], interval, begins)
         begin = x[-2:] * nuisance
         return response(now, command, ground, interval, float(begin[0]), float(begin[1]))
 
@@ -233,7 +275,8 @@ def fit(
             parts = zip(model(x), outputs, weights, strict=False)
             return np.concatenate([(fitted - output) * weight for fitted, output, weight in parts])
 
-        x = optimize.least_squares(residual, np.clip(x, low, high), bounds=(low, high), x_scale="jac").x
+        start = np.clip(x, low, high)
+        x = optimize.least_squares(residual, start, bounds=(low, high), x_scale="jac", max_nfev=STEPS).x
         left = [float(np.std(fitted - output)) for fitted, output in zip(model(x), outputs, strict=False)]
         least_left = [WORST * float(np.std(output)) for output in outputs]
         last, weights = weights, [1.0 / max(pair) for pair in zip(left, least_left, strict=True)]
