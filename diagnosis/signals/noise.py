@@ -16,6 +16,7 @@ COARSE = 1e3  # roundings that a step must exceed
 # that it must have, as a few of them have a common divisor by chance, and the share of samples that may have a level of
 # their own, as free floats do.
 DIGITS, LAST_DIGIT, COARSE_PRINTED, FEWEST, RECURRING = (12, 10, 9, 8, 7, 6), 5.0, 50.0, 24, 0.5
+INTERPOLATED = 1.5  # times a step, from which on another one is coarser
 # Levels from which on they tell of a step: the two gaps between three free floats have no common divisor.
 LEVELS = 3
 # Of how often the commonest level occurs, up to which one may have come about between two others.
@@ -40,6 +41,8 @@ def quantum(x: Array) -> float:
     if step == 0.0 and FEWEST < np.unique(x).size < RECURRING * x.size:
         printed = (lattice(x, LAST_DIGIT * 10.0**-digits, COARSE_PRINTED) for digits in DIGITS)
         step = next((one for one in printed if one > 0.0), 0.0)
+        if step > 0.0 and quantum_between(x) > INTERPOLATED * step:
+            return 0.0
     return step
 
 

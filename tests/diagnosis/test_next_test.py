@@ -14,7 +14,7 @@ from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import LaboratoryPart
 from laboratories.effects import CATALOGUE, checked
-from tests.diagnosis.cases import Cases, lab_a
+from tests.diagnosis.cases import Cases, lab_a, lab_b
 
 
 def laboratory(cases: Cases) -> Data:
@@ -105,3 +105,23 @@ def test_spikes_of_the_recording_are_not_in_the_next_test(cases: Cases) -> None:
     spiky = dataclasses.replace(data, spikes=np.zeros_like(data.part.present))
     longer = np.zeros((2 * len(data.part.measured), data.part.measured.shape[1]))
     assert next_test.played(spiky, longer).there.shape == longer.shape
+
+
+@pytest.mark.parametrize("ticks", [3001, 3999])
+def test_tests_of_a_machine_without_a_spring_have_their_own_length_and_begin_at_rest(
+    cases: Cases, ticks: int
+) -> None:
+    data = residuals.prepare(lab_b(whole := cases.record(duration=8.0)), whole)
+    part = data.part
+    assert isinstance(part, LaboratoryPart)
+    part = part.first(ticks).replaced(freed=2, anew=np.array([[0.0, 0.01, 0.1]]))
+    part = part.replaced(inputs=part.inputs | {"table_command": np.zeros(ticks)})
+    tests = next_test.menu(dataclasses.replace(data, part=part))
+    assert tests
+    assert not any("table" in name for name, _ in tests)
+    lighter = hypothesis(data, "damper.mass", factor=0.9)
+    weaker = hypothesis(data, "damper.gain", factor=0.9)
+    for _, item in tests:
+        assert isinstance(item.part, LaboratoryPart)
+        assert np.all(np.asarray(item.part.anew)[:, 1:] == 0.0)
+        assert np.isfinite(next_test.separation(item, lighter, weaker))

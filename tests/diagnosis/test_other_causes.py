@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.findings.certainty.other_causes import other_causes, told_by_little
+from diagnosis.findings.certainty.other_causes import of_no_size, other_causes, told_by_little
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
@@ -28,6 +28,19 @@ def test_a_load_cell_that_leaks_for_longer_than_the_test_may_be_a_specimen_that_
     said = list(other_causes(found))
     assert len(said) == relaxes
     assert all("relaxes" in sentence for sentence in said)
+
+
+@pytest.mark.parametrize(("delay", "untold"), [(2e-5, True), (4e-3, False)])
+def test_an_effect_whose_interval_holds_none_of_it_is_doubted(
+    cases: Cases, delay: float, untold: bool
+) -> None:
+    whole = cases.record(duration=8.0)
+    data = residuals.prepare(lab_a(whole), whole)
+    bare = fitting.fit(data, {})
+    fit = fitting.at(data, {"actuator.delay": {"delay": delay}}, bare.z)
+    assert of_no_size(fit) == (["actuator.delay"] if untold else [])
+    said = [text for text in other_causes(Search(data, bare, fit, ())) if "holds none of it" in text]
+    assert bool(said) == untold
 
 
 @pytest.mark.parametrize(

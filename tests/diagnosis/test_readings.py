@@ -44,6 +44,28 @@ def test_rounding_far_below_the_noise_gives_no_finding(cases: Cases) -> None:
     assert found_in(whole) == []
 
 
+@pytest.mark.parametrize(("times", "coarse"), [(1.5, False), (2.8, True)])
+def test_steps_of_about_the_noise_are_those_of_a_usual_converter(
+    cases: Cases, times: float, coarse: bool
+) -> None:
+    step = times * cases.record(duration=8.0).planned_noise["damper_stroke"]
+    whole = cases.record({"sensor.damper_stroke.quantization": {"step": step}}, duration=8.0)
+    assert readings.steps(whole) == {"damper_stroke": pytest.approx(step)}
+    assert len(found_in(whole)) == coarse
+
+
+def test_digits_of_readings_without_noise_are_no_steps_of_a_sensor(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    fine = 1e-6 * float(np.std(whole.signals["damper_stroke"]))
+    still = dict.fromkeys(whole.planned_noise, 0.0)
+    white = dict.fromkeys(whole.planned_noise, 1e-15)
+    assert readings.findings(whole, white | still, {"damper_stroke": fine}, {"damper_stroke": fine}) == []
+    (found,) = readings.findings(
+        whole, white | still, {"damper_stroke": 1e3 * fine}, {"damper_stroke": 1e3 * fine}
+    )
+    assert found.effect == "sensor.damper_stroke.quantization"
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("signal", "rms"), [("column_force", 500.0), ("damper_stroke", 2e-5), ("table_acceleration", 0.05)]

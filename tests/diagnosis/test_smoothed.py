@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from diagnosis.recorded.smoothed import smoothed
+from diagnosis.recorded.smoothed import smoothed, turns, without_small_turns
 
 STEP, ROWS = 1.0 / 1024.0, 12 * 1024
 NOISE = 3e-6  # m
@@ -34,3 +36,26 @@ def test_a_reading_that_moves_at_all_frequencies_or_has_no_noise_stays_as_it_is(
     rough = np.cumsum(np.random.default_rng(2).standard_normal(ROWS))
     for reading in (rough, motion(400.0) + 1e-12 * rough, np.zeros(ROWS)):
         assert np.array_equal(smoothed(reading), reading)
+
+
+@given(st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=60), st.floats(1e-3, 0.5))
+def test_a_path_goes_one_way_between_turns_and_back_by_more_than_the_least(
+    rows: list[float], least: float
+) -> None:
+    path = np.array(rows)
+    places = turns(path, least)
+    assert places[0] == 0
+    assert places[-1] == path.size - 1
+    assert places == sorted(set(places))
+    apart = np.abs(np.diff(path[places]))
+    assert np.all(apart[1:-1] > least)
+
+
+@given(st.integers(0, 99), st.floats(1e-4, 3e-3))
+def test_rows_of_cycles_lose_the_turns_of_noise_and_keep_their_own(seed: int, noise: float) -> None:
+    true = np.sin(np.linspace(0.0, 6.0 * np.pi, 900)) * np.linspace(0.3, 1.0, 900)
+    read = true + noise * np.random.default_rng(seed).standard_normal(true.size)
+    found = without_small_turns(read, noise)
+    assert np.count_nonzero(np.diff(np.sign(np.diff(found)[np.diff(found) != 0.0]))) <= 8
+    assert np.std(found - true) <= np.std(read - true) * (1.0 + 1e-9)
+    assert np.array_equal(without_small_turns(true, noise), true)

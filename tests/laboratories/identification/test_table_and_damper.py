@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from common.errors import InputError
 from common.plan.laboratory_tables import Damper, ShakingTable
@@ -179,6 +180,25 @@ def test_a_damper_without_a_spring_is_identified_piece_by_piece() -> None:
     for name, true in {"mass": MASS, "damping": DASHPOT, "friction": FRICTION, "offset": OFFSET}.items():
         assert found[name].value == pytest.approx(true, rel=0.01), name
         assert found[name].high - found[name].low < 0.02 * true, name
+
+
+def test_a_drive_without_a_spring_shows_its_motor_under_a_held_command() -> None:
+    step, mass, dashpot, lag, ticks = 1e-3, 80.0, 150.0, 1.5e-3, 6000
+    t = step * np.arange(ticks)
+    command = 90.0 * np.sign(np.sin(2.0 * np.pi * 0.8 * t)) + 40.0 * np.sin(2.0 * np.pi * 6.3 * t + 1.0)
+    rates = np.array([[0.0, 1.0, 0.0], [0.0, -dashpot / mass, 1.0 / mass], [0.0, 0.0, -1.0 / lag]])
+    whole = expm(step * np.block([[rates, np.array([[0.0], [0.0], [1.0 / lag]])], [np.zeros((1, 4))]]))
+    states = np.zeros((ticks, 3))
+    for k in range(ticks - 1):
+        states[k + 1] = whole[:3, :3] @ states[k] + whole[:3, 3] * command[k]
+    planned = replace(Damper(), mass=85.0, stiffness=0.0, damping=140.0, motor_time_constant=1e-3)
+    free = ("mass", "damping", "motor_time_constant", "friction", "offset")
+    position = states[:, 0] + white(3, ticks, 1e-7)
+    found = damper.least_squares(command, position, None, None, step, free=free, nominal=planned)
+    assert found["mass"].value == pytest.approx(mass, rel=1e-3)
+    assert found["damping"].value == pytest.approx(dashpot, rel=3e-3)
+    assert found["motor_time_constant"].value == pytest.approx(lag, rel=0.03)
+    assert found.stroke_nrmse < 3e-4
 
 
 def test_a_shaken_table_excites_the_damper() -> None:
