@@ -23,7 +23,10 @@ WANDERS = 3  # degree of the polynomial that the phase of the mains follows
 STEADY = 0.35  # by which its amplitude may vary from the mean, relative; noise adds to that
 ALSO = 1e-3  # chance of a line in another reading, at the one frequency where it is looked for
 MAINS = (50.0, 60.0)  # Hz
-NEAR = 0.1  # Hz, within which a frequency is that of the mains or a harmonic
+NEAR = 0.2  # Hz, within which a frequency is that of the mains or a harmonic
+# s, over which phase and amplitude of the mains are followed beside a polynomial: their frequency wanders at random, by
+# up to a tenth of a hertz within half a minute. As much of a reading's noise goes with them as lies within half a hertz.
+FOLLOWED = 0.4
 
 
 class Pickup(NamedTuple):
@@ -145,25 +148,50 @@ def demodulated(residual: Array, line: Pickup, interval: float) -> NDArray[np.co
 def steady(residual: Array, line: Pickup, interval: float) -> float:
     """Amplitude of a line that is the same throughout a residual (n,), 0 where it comes and goes.
 
-    Each part's amplitude and phase are held against those of the whole, with what noise makes them differ by.
+    Each part's amplitude and phase are held against those of the whole, with what noise makes them differ by; of the
+    mains, whose phase wanders, the amplitude alone.
     """
-    parts = demodulated(residual, line, interval)
     beside = [line._replace(frequency=line.frequency + shift) for shift in (-AROUND, AROUND)]
-    mean = complex(np.mean(parts))
+    if of_mains(line.frequency):
+        sizes = rms_of_parts(residual, line, interval)
+        noise = float(np.median([rms_of_parts(residual, one, interval) for one in beside]))
+        sizes = np.sqrt(np.maximum(sizes**2 - noise**2, 0.0))
+        mean = float(np.mean(sizes))
+        return mean if np.all(np.abs(sizes - mean) < STEADY * mean + 2.5 * noise) else 0.0
+    parts = demodulated(residual, line, interval)
+    whole = complex(np.mean(parts))
     # rms of a complex normal number over the median of its size
     noise = 1.2 * float(np.median([np.abs(demodulated(residual, one, interval)) for one in beside]))
-    apart = np.abs(parts - mean)
-    return abs(mean) if np.all(apart < STEADY * abs(mean) + 2.5 * noise) else 0.0
+    apart = np.abs(parts - whole)
+    return abs(whole) if np.all(apart < STEADY * abs(whole) + 2.5 * noise) else 0.0
+
+
+def rms_of_parts(residual: Array, line: Pickup, interval: float) -> Array:
+    """Rms amplitude (parts,) of what follows a line in a residual (n,), in the parts of the record."""
+    pieces = np.array_split(np.square(np.abs(envelope(residual, line, interval))), PARTS)
+    return np.sqrt(np.array([piece.mean() for piece in pieces]))
+
+
+def envelope(residual: Array, line: Pickup, interval: float) -> NDArray[np.complex128]:
+    """Amplitude and phase (n,) of a residual (n,) over a line's phase, followed over `FOLLOWED` seconds."""
+    t = np.asarray(interval * np.arange(residual.size), dtype=np.float64)
+    turned = 2.0 * residual * np.exp(-1j * line.phase(t))
+    return np.asarray(ndimage.gaussian_filter1d(turned, FOLLOWED / interval, mode="nearest"))
 
 
 def waves(residual: Array, lines: Sequence[Pickup], interval: float) -> Array:
-    """The lines' part (n,) of a residual (n,), by least squares over all lines at once."""
+    """The lines' part (n,) of a residual (n,), by least squares over all lines at once, with the mains followed."""
     if not lines:
         return np.zeros_like(residual)
     t = np.asarray(interval * np.arange(residual.size), dtype=np.float64)
     columns = [shape(item.phase(t)) for item in lines for shape in (np.cos, np.sin)]
     x = np.column_stack(columns)
-    return np.asarray(x @ np.linalg.lstsq(x, residual, rcond=None)[0])
+    found: Array = np.asarray(x @ np.linalg.lstsq(x, residual, rcond=None)[0])
+    for one in lines:
+        if of_mains(one.frequency):
+            left = envelope(residual - found, one, interval)
+            found = found + np.real(left * np.exp(1j * one.phase(t)))
+    return found
 
 
 def named(lines: Sequence[Pickup]) -> tuple[float, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -148,6 +150,18 @@ def test_loud_hum_is_taken_away_to_the_noise_though_no_line_of_a_spectrum_lies_o
     assert found.frequency == pytest.approx(frequency + wandering.mean(), abs=5e-3)
     assert found.amplitude == pytest.approx(times, rel=0.02)
     assert np.std(reading - pickup.waves(reading, [found], INTERVAL)) == pytest.approx(1.0, abs=left - 1.0)
+
+
+@pytest.mark.parametrize(("times", "left"), [(0.5, 0.02), (1.0, 0.03), (5.0, 0.5)])
+def test_mains_whose_frequency_wanders_at_random_are_followed(times: float, left: float) -> None:
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        wandering = 0.03 * np.sqrt(INTERVAL) * np.cumsum(rng.standard_normal(13_000))  # Hz
+        reading = rng.standard_normal(13_000)
+        reading += times * math.sqrt(2.0) * np.sin(2.0 * np.pi * np.cumsum(50.0 + wandering) * INTERVAL)
+        found = pickup.pickups(reading, INTERVAL)
+        assert 50.0 in pickup.named(found)
+        assert np.std(reading - pickup.waves(reading, found, INTERVAL)) == pytest.approx(1.0, abs=left)
 
 
 def test_lines_in_several_readings_count_as_motion_except_those_at_mains_frequency() -> None:
