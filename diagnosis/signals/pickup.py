@@ -25,7 +25,7 @@ ALSO = 1e-3  # chance of a line in another reading, at the one frequency where i
 MAINS = (50.0, 60.0)  # Hz
 NEAR = 0.2  # Hz, within which a frequency is that of the mains or a harmonic
 # s, over which phase and amplitude of the mains are followed beside a polynomial: their frequency wanders at random, by
-# up to a tenth of a hertz within half a minute. As much of a reading's noise goes with them as lies within half a hertz.
+# up to a tenth of a hertz within half a minute. As much of a reading's noise goes with them as lies within 0.5 Hz.
 FOLLOWED = 0.4
 
 
