@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 
         stated = load_map(args.map)
         table = put_together(stated, tabular.read_table(args.data, stated.form), args.data)
-        mapping = begun(stated, table, args.data)
+        mapping, begins = begun(stated, table, args.data)
         found = on_ticks(mapping, table, args.data, as_is=args.as_is)
         ground, unread = ground_of(mapping, found)
         rest = readings_at_rest(mapping, table, args.data, found)
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
             write(path, mapping, found, args.data.name, ground, rest, as_is=args.as_is)
             if not args.as_is:
                 check_slips(path, args.data)
-    told = ImportRemarks(table.form, unread, mapping.start if stated.start is None else None, rest)
+    told = ImportRemarks(table.form, unread, begins, rest)
     show(args, mapping, found, told)
     return 0
 

@@ -21,14 +21,18 @@ LACKING = 1e-6  # that a correlation may lack to the best one
 FEWEST = 2  # rows with a number, without which there is no motion
 AHEAD = 0.5  # s before the test at least: less may be an error of the controller, which reads the motion late
 HELD = 0.5  # share of the plan's motion, by its energy, that the data must hold
+FASTER = 0.95  # of an interval, below which rows come faster than ticks
 PLACES = 16  # in an interval, at which the first tick may be
 # Times the least error, and an error of a motion that is printed exactly: of places where a held motion is the same the
 # last one counts.
 AS_GOOD, EXACT = 1.001, 1e-9
 
 
-def begun(mapping: ImportMap, table: DataTable, data: Path) -> ImportMap:
-    """The map with the time at which the test begins, where it states none and the data begin before the test.
+def begun(mapping: ImportMap, table: DataTable, data: Path) -> tuple[ImportMap, float | None]:
+    """The map from the first row of the test on, where it states none, and when that begins in the data, s.
+
+    None where the data do not begin before the test, or the map says when it does. Of rows that come faster than ticks
+    the last one before the first tick is the first of the test, so that this tick is the first one of the controller.
 
     Raises:
         InputError: a column is missing, or the time does not increase.
@@ -36,19 +40,28 @@ def begun(mapping: ImportMap, table: DataTable, data: Path) -> ImportMap:
     source = mapping.signals.get(GROUND)
     planned = None if mapping.static or mapping.start is not None else motion(mapping)
     if planned is None or source is None or source.value is not None:
-        return mapping
+        return mapping, None
     times, rows = time_base(mapping, table, data)
     column = pick(table, source.column, data)[rows]
     there = np.isfinite(column)
     interval = mapping.plan.test.interval
     if np.count_nonzero(there) < FEWEST or times[-1] - times[0] > LONGEST_TEST:
-        return mapping
+        return mapping, None
     grid = np.arange(times[0], times[-1], interval)
     ahead = ticks_before(np.interp(grid, times[there], column[there]), planned)
     if ahead * interval < AHEAD:
-        return mapping
+        return mapping, None
     begin = first_tick(times[there], column[there], planned, times[0] + ahead * interval, interval)
-    return replace(mapping, start=float(times[np.searchsorted(times, begin)]))
+    return replace(mapping, start=float(times[first_row(times, begin, interval)])), begin
+
+
+def first_row(times: Array, begin: float, interval: float) -> int:
+    """Place of the first row of a test that begins at a time (s), of rows at times (n,), s."""
+    margin = 0.5 * interval / PLACES
+    after = int(np.searchsorted(times, begin - margin))
+    on_row = times[min(after, times.size - 1)] < begin + margin
+    fast = float(np.median(np.diff(times))) < FASTER * interval
+    return after - 1 if fast and not on_row and after > 0 else int(np.searchsorted(times, begin))
 
 
 def motion(mapping: ImportMap) -> Array | None:
