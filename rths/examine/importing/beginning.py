@@ -32,7 +32,8 @@ def begun(mapping: ImportMap, table: DataTable, data: Path) -> tuple[ImportMap, 
     """The map from the first row of the test on, where it states none, and when that begins in the data, s.
 
     None where the data do not begin before the test, or the map says when it does. Of rows that come faster than ticks
-    the last one before the first tick is the first of the test, so that this tick is the first one of the controller.
+    the nearest one to the first tick is the first of the test: the clock of a controller is known beside it, to half an
+    interval.
 
     Raises:
         InputError: a column is missing, or the time does not increase.
@@ -57,11 +58,9 @@ def begun(mapping: ImportMap, table: DataTable, data: Path) -> tuple[ImportMap, 
 
 def first_row(times: Array, begin: float, interval: float) -> int:
     """Place of the first row of a test that begins at a time (s), of rows at times (n,), s."""
-    margin = 0.5 * interval / PLACES
-    after = int(np.searchsorted(times, begin - margin))
-    on_row = times[min(after, times.size - 1)] < begin + margin
+    after = min(int(np.searchsorted(times, begin)), times.size - 1)
     fast = float(np.median(np.diff(times))) < FASTER * interval
-    return after - 1 if fast and not on_row and after > 0 else int(np.searchsorted(times, begin))
+    return after - 1 if fast and after > 0 and begin - times[after - 1] < times[after] - begin else after
 
 
 def motion(mapping: ImportMap) -> Array | None:
