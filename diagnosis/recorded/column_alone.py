@@ -23,6 +23,9 @@ class ColumnAlone(Measured):
 
     name = "column"
     exact = False
+    static = False
+    channel = NOTHING_STATED
+    interval = 0.0  # s, that only a channel with a filter or a delay asks for
 
     def __init__(self, record: Record, lab: RecordedLaboratory) -> None:
         self.lab, self.role = lab, lab.role

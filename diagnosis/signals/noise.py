@@ -41,9 +41,14 @@ def quantum(x: Array) -> float:
     if step == 0.0 and FEWEST < np.unique(x).size < RECURRING * x.size:
         printed = (lattice(x, LAST_DIGIT * 10.0**-digits, COARSE_PRINTED) for digits in DIGITS)
         step = next((one for one in printed if one > 0.0), 0.0)
-        if step > 0.0 and quantum_between(x) > INTERPOLATED * step:
+        if step > 0.0 and between(x, step):
             return 0.0
     return step
+
+
+def between(x: Array, step: float) -> bool:
+    """Whether a signal (n,) with steps was interpolated between coarser ones, which many equal neighbours show."""
+    return np.unique(x[1:][np.diff(x) == 0.0]).size > FEWEST and quantum_between(x) > INTERPOLATED * step
 
 
 def lattice(x: Array, relative: float, coarse: float) -> float:

@@ -27,6 +27,7 @@ NEAR = 0.2  # Hz, within which a frequency is that of the mains or a harmonic
 # s, over which phase and amplitude of the mains are followed beside a polynomial: their frequency wanders at random, by
 # up to a tenth of a hertz within half a minute. As much of a reading's noise goes with them as lies within 0.5 Hz.
 FOLLOWED = 0.4
+MORE = 2.0  # times the power beside a line of the mains, from which on what is left of it is followed
 
 
 class Pickup(NamedTuple):
@@ -188,10 +189,17 @@ def waves(residual: Array, lines: Sequence[Pickup], interval: float) -> Array:
     x = np.column_stack(columns)
     found: Array = np.asarray(x @ np.linalg.lstsq(x, residual, rcond=None)[0])
     for one in lines:
-        if of_mains(one.frequency):
+        if of_mains(one.frequency) and wanders(residual - found, one, interval):
             left = envelope(residual - found, one, interval)
             found = found + np.real(left * np.exp(1j * one.phase(t)))
     return found
+
+
+def wanders(left: Array, line: Pickup, interval: float) -> bool:
+    """Whether more is left (n,) near a line that was taken away than beside it: its phase goes other ways."""
+    beside = [line._replace(frequency=line.frequency + shift) for shift in (-AROUND, AROUND)]
+    near, *others = (float(np.mean(np.abs(envelope(left, one, interval)) ** 2)) for one in (line, *beside))
+    return near > MORE * max(others)
 
 
 def named(lines: Sequence[Pickup]) -> tuple[float, ...]:

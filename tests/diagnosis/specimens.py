@@ -76,7 +76,7 @@ class Driven(ColumnAlone):
 
     def __init__(self) -> None:
         self.signals, self.nuisances, self.candidates = ("column_force",), (), MadeSpecimen.candidates
-        self.role, self.static = MASTER, True
+        self.role = MASTER
         self.inputs = swelling()
         force = forces("pinched", {"stiffness": K, "yield_displacement": LIMIT, **self.TRUE}, self.inputs)
         self.measured = (force + NOISE * np.random.default_rng(2).standard_normal(TICKS))[:, None]
