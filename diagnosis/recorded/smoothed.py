@@ -59,12 +59,8 @@ def without_small_turns(path: Array, error: float) -> Array:
 
 def turns(path: Array, least: float) -> list[int]:
     """Places of a path's (n,) first and last rows, and of the turns after which it goes back by more than `least`."""
-    places, way, far, back = (
-        [0],
-        0,
-        0,
-        0,
-    )  # way: 1 where it rises, −1 where it falls, 0 where neither is known
+    places, far, back = [0], 0, 0
+    way = 0  # 1 where it rises, −1 where it falls, 0 where neither is known
     for place, value in enumerate(path.tolist()):
         if way == 0:
             far, back = (place if value > path[far] else far), (place if value < path[back] else back)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.findings.certainty.other_causes import of_no_size, other_causes, told_by_little
+from diagnosis.findings.verdict import judge
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
@@ -41,6 +42,8 @@ def test_an_effect_whose_interval_holds_none_of_it_is_doubted(
     assert of_no_size(fit) == (["actuator.delay"] if untold else [])
     said = [text for text in other_causes(Search(data, bare, fit, ())) if "holds none of it" in text]
     assert bool(said) == untold
+    if untold:  # nominal parameters leave nothing without it
+        assert judge(Search(data, bare, fit, ())).effects == ()
 
 
 @pytest.mark.parametrize(
