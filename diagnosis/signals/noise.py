@@ -38,11 +38,10 @@ def quantum(x: Array) -> float:
     """
     checked(signal=x)
     step = lattice(x, ROUNDING, COARSE)
-    if step == 0.0 and FEWEST < np.unique(x).size < RECURRING * x.size:
-        printed = (lattice(x, LAST_DIGIT * 10.0**-digits, COARSE_PRINTED) for digits in DIGITS)
-        step = next((one for one in printed if one > 0.0), 0.0)
-        if step > 0.0 and between(x, step):
-            return 0.0
+    if FEWEST < np.unique(x).size < RECURRING * x.size:
+        printed = max(lattice(x, LAST_DIGIT * 10.0**-digits, COARSE_PRINTED) for digits in DIGITS)
+        if printed > INTERPOLATED * step and not between(x, printed):
+            return printed
     return step
 
 
