@@ -65,9 +65,7 @@ def turns(path: Array, least: float) -> list[int]:
         if way == 0:
             far, back = (place if value > path[far] else far), (place if value < path[back] else back)
             if path[far] - path[back] > least:
-                way, first = (1, back) if far > back else (-1, far)
-                places += [first] if first > 0 else []
-                far = place
+                way, far = (1 if far > back else -1), place
         elif way * (value - path[far]) > 0.0:
             far = place
         elif way * (path[far] - value) > least:
