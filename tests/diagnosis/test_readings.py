@@ -56,14 +56,13 @@ def test_steps_of_about_the_noise_are_those_of_a_usual_converter(
 
 def test_digits_of_readings_without_noise_are_no_steps_of_a_sensor(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
-    fine = 1e-6 * float(np.std(whole.signals["damper_stroke"]))
-    still = dict.fromkeys(whole.planned_noise, 0.0)
-    white = dict.fromkeys(whole.planned_noise, 1e-15)
-    assert readings.findings(whole, white | still, {"damper_stroke": fine}, {"damper_stroke": fine}) == []
-    (found,) = readings.findings(
-        whole, white | still, {"damper_stroke": 1e3 * fine}, {"damper_stroke": 1e3 * fine}
-    )
-    assert found.effect == "sensor.damper_stroke.quantization"
+    reach = float(np.std(whole.signals["damper_stroke"]))
+    white = {name: 1e-6 * noise for name, noise in whole.planned_noise.items()}
+    for share, coarse in ((3e-5, False), (3e-4, True)):
+        step = {"damper_stroke": share * reach}
+        assert step["damper_stroke"] > 5e-3 * whole.planned_noise["damper_stroke"]  # far above all noise
+        found = readings.findings(whole, white, step, step)
+        assert [item.effect for item in found] == coarse * ["sensor.damper_stroke.quantization"]
 
 
 @pytest.mark.long

@@ -11,7 +11,10 @@ import pytest
 from scipy import signal
 
 from common.recording.imported import NOTHING_STATED, ImportedChannel, LoggerFilter
-from diagnosis.recorded.column_alone import apart
+from common.recording.reader import read as read_recording
+from diagnosis.recorded import record
+from diagnosis.recorded.column_alone import ColumnAlone, apart
+from diagnosis.recorded.divided import parts_of
 from models.registry import Array
 from models.specimens.fit import forces
 from rths.examine.diagnose import diagnose_recording
@@ -91,6 +94,22 @@ def test_the_digits_of_a_static_test_are_no_gap_of_its_specimen(noisy: bool, sta
         "no_gap",
         "within_tolerances",
     )
+
+
+def test_rows_that_drive_a_specimen_turn_where_it_did_and_err_by_noise_and_digits(
+    status: Any, tmp_path: Path
+) -> None:
+    true = np.concatenate(
+        [np.linspace(0.0, 8.0, 1000), np.linspace(8.0, -8.0, 2000), np.linspace(-8.0, 0.0, 1000)]
+    )
+    read = true + 4e-3 * np.random.default_rng(7).standard_normal(true.size)
+    columns = np.column_stack([read, 1e-3 * forces("bouc_wen", LAW, 1e-3 * true)])
+    status(PLAN.format(model="bouc_wen", more=YIELDS), columns, ["%.2f", "%.6f"], "static = true\n", ("", ""))
+    (part,) = parts_of(record.build(read_recording(tmp_path / "a.mcap"), role="master"))
+    assert isinstance(part, ColumnAlone)
+    ways = np.sign(np.diff(part.inputs))
+    assert np.count_nonzero(np.diff(ways[ways != 0.0])) == 2
+    assert part.blurred == pytest.approx(LAW["stiffness"] * np.hypot(4e-6, 1e-5 / np.sqrt(12.0)), rel=1e-6)
 
 
 def test_channels_that_are_alike_need_no_filter() -> None:
