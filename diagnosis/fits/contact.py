@@ -25,7 +25,8 @@ from models.registry import Array
 FIRST = 0.02  # of the largest residual, from which on the stop has been met
 INSIDE = (0.97, 0.7)  # of the largest stroke before that, where a stiff and a soft stop may stand
 LIGHTLY = (0.99, 0.96, 0.9, 0.8)  # of the largest stroke, where a stop may stand that is met lightly
-NEAREST = 3  # of the starts of such a stop, those that are fitted
+NEAREST = 3  # of the starts of such a stop, those that are fitted,
+ROUGH = 4  # so many steps; the best of them goes to its end
 AFTER = 0.4  # s after first contact that the shortest fit covers
 LONGER = 1.3  # factor from one fit to the next
 # Times the stroke before that: no motion that meets a stop goes so far, not even an unstable one.
@@ -46,15 +47,17 @@ def touched(data: Data, fit: Fit, effect: Effect) -> Fit | None:
     if not there.any():
         return None
     reached = float(np.max(np.abs(data.part.measured[there, place])))
-    starts = [
-        effect.under(law, {stop.place: share * reached, stop.stiffness: stiffness})
-        for law in range(len(effect.laws))
+    springs = [
+        {stop.place: share * reached, stop.stiffness: stiffness}
         for share in LIGHTLY
         for stiffness in stop.starts
     ]
+    starts = [*springs, *(under for values in springs for under in further_laws(effect, values))]
     laid = each(lambda values: fitting.at(data, {**fit.values, effect.name: values}, fit.z), starts)
     nearest = sorted(laid, key=cost)[:NEAREST]
-    return min(each(lambda item: fitting.fit(data, item.values, item.z), nearest), key=cost)
+    rough = each(lambda item: fitting.fit(data, item.values, item.z, ROUGH, rounds=1), nearest)
+    best = min(rough, key=cost)
+    return fitting.fit(data, best.values, best.z)
 
 
 def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
