@@ -104,23 +104,30 @@ class LoggedReadings(Nuisance):
     """Delay (s), about the one found elsewhere, or gain with which a logger recorded readings of a laboratory.
 
     A logger whose filter is stated may delay by less than that filter; one of which nothing is stated records nothing
-    earlier than `least`.
+    earlier than `least`. Up to `held` any delay is as likely as another one; what is beyond it is the logger's.
     """
 
     of_record = True
     signals: tuple[str, ...] = ()  # of the readings in their laboratory
     about: float = 0.0  # s, the delay at z = 0
     least: float = 0.0  # s, of the delay
+    held: float = 0.0  # s, that a command may be held before it acts
 
     def moved(self, system: System, z: float) -> System:
         """The system whose readings have that gain, or that delay."""
         if self.parameter == "gain":
             values = {"gain": 1.0 + z * self.tolerance}
         else:
-            values = {"delay": max(self.least, self.about + z * self.tolerance)}
+            values = {"delay": max(self.least, self.about + self.late(z))}
         if values in ({"gain": 1.0}, {"delay": 0.0}):
             return system
         return system.recorded(*self.signals, **values)
+
+    def late(self, z: float) -> float:
+        """The delay (s) that is `z` standard deviations from the one expected."""
+        both = math.hypot(self.tolerance, EVENLY * self.held)
+        inside = min(abs(z), self.held / both)
+        return math.copysign(both * inside + self.tolerance * (abs(z) - inside), z)
 
 
 def nuisances(lab: RecordedLaboratory, names: tuple[str, ...]) -> tuple[Nuisance, ...]:
@@ -259,11 +266,12 @@ def of_logger(
     return tuple(
         LoggedReadings(
             "delay",
-            spread or math.hypot(max(ALIKE, UNLIKE * about), unsure, EVENLY * min(held, HELD)),
+            spread or math.hypot(max(ALIKE, UNLIKE * about), unsure),
             lab,
             those,
             about,
             -min(early, HELD),
+            0.0 if spread else min(held, HELD),
         )
         for (about, unsure), force in groups
         if (those := tuple(row.name for row in rows if (row.unit == "N") == force))
@@ -283,14 +291,16 @@ def of_filters(
         those = {row.name: one.filter for row, one in rows if one.filter and (row.unit == "N") == force}
         if those:
             late = max(ImportedChannel(one).late for one in those.values())
-            known = math.hypot(PASSING * late, BETWEEN, EVENLY * min(held, HELD))
-            result.append(LoggedReadings("delay", known, lab, tuple(those), least=-late))
+            known = math.hypot(PASSING * late, BETWEEN)
+            result.append(
+                LoggedReadings("delay", known, lab, tuple(those), least=-late, held=min(held, HELD))
+            )
     return tuple(result)
 
 
 def nothing_stated(mapped: ImportedData | None, lab: RecordedLaboratory) -> bool:
     """Whether the import map states neither filter nor mean nor delay for any channel of a laboratory."""
-    return all(one.filter is None and one.delay == one.average == 0.0 for one in channels(mapped, lab))
+    return not any(one.filter or one.timed or one.delay or one.average for one in channels(mapped, lab))
 
 
 def calibrations(

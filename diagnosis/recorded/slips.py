@@ -1,5 +1,7 @@
 """Slips of units and signs: a reading that is about a hundred times its prediction or more, or has the opposite sign.
 
+One that is several times its prediction may be in g, cm or volts, and may be right: it is only told.
+
 A nominal model that is merely wrong is no slip: nobody plans a laboratory a hundred times too stiff, but it is easily
 forgotten that a data column is in millimetres. So only factors count that no wrong model has, and signs of readings
 whose shape is that of the prediction. A specimen with wide loops has another shape than its elastic model; but no
@@ -23,6 +25,7 @@ from diagnosis.recorded.record import Record
 from models.registry import Array
 
 FAR = 90.0  # factor from which on it is a slip: cm for m makes 100, while 9.81 for g may be a wrong model
+TOLD = 5.0  # factor from which on it is told
 ALIKE = 0.5  # correlation from which on two signals have the same shape: that of sines 60° apart
 # correlation, negative, from which on a sign is wrong: sines 154° apart; less may be a wrong phase, or a mass that
 # bounces off a stop.
@@ -64,9 +67,9 @@ class ReadingSlip:
                 f"check the sign of its column and of {names}"
             )
         times = (
-            f"{abs(self.factor):.3g} times"
+            f"{three_digits(abs(self.factor))} times"
             if abs(self.factor) >= 1.0
-            else f"1/{1.0 / abs(self.factor):.3g} of"
+            else f"1/{three_digits(1.0 / abs(self.factor))} of"
         )
         return (
             f"'{self.signal}' is {times} what the plan predicts from {names}{self._guess}: "
@@ -79,6 +82,11 @@ class ReadingSlip:
         return not 1.0 / FAR < abs(self.factor) < FAR
 
     @property
+    def sure(self) -> bool:
+        """Whether size or sign are so wrong that no model is."""
+        return self.far or self.factor < 0.0
+
+    @property
     def _guess(self) -> str:
         size = max(abs(self.factor), 1.0 / abs(self.factor))
         found = next((text for ten, text in USUAL.items() if ten / NEAR < size < NEAR * ten), "")
@@ -89,18 +97,26 @@ def refuse_slips(record: Record, data: Path) -> None:
     """Raise InputError where imported `data` have a slip, unless they were imported as they are."""
     stated = imported(record.run)
     found = slips(record) if stated is not None and not stated.as_is else []
-    if found:
+    if found and found[0].sure:
         raise InputError(f"{data}: {found[0].sentence}; if it is right, import it with --as-is.")
 
 
+def doubtful(record: Record) -> list[str]:
+    """Sentences on readings that are several times their prediction, the farthest first."""
+    return [f"{slip.sentence}, unless that is what the test is about" for slip in slips(record)]
+
+
 def slips(record: Record) -> list[ReadingSlip]:
-    """The slips of a recording, those of the largest factor first."""
+    """The slips of a recording and what may be some, surest and largest first."""
     found = [slip for lab in record.labs for slip in (*of_laboratory(record, lab), *giving(record, lab))]
-    return sorted(found, key=lambda slip: -abs(np.log(abs(slip.factor))))
+    return sorted(found, key=lambda slip: (not slip.sure, -abs(np.log(abs(slip.factor)))))
 
 
 def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[ReadingSlip]:
-    """The slips of one laboratory whose commands were recorded, or of a column whose deformation was."""
+    """The slips of one laboratory whose commands were recorded, or of a column whose deformation was.
+
+    A motion without a restoring force is compared by what forces did to it from piece to piece.
+    """
     inputs = tuple(name for name in lab.commands if record.has(name) and np.ptp(record.signals[name]) > 0.0)
     position = lab.signal(lab.kind.channels.position)
     alone = any(machine.site == "column" for machine in lab.kind.machines(lab.plan)) and record.has(position)
@@ -108,13 +124,16 @@ def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[ReadingSl
         return
     part = LaboratoryPart(record, lab) if inputs else ColumnAlone(record, lab)
     commands = inputs or (position,)
-    predicted = part.predict(record.systems[lab.role])
     most = round(LONGEST_LAG / record.plan.test.interval)
-    for place, name in enumerate(part.signals):
+    read, wanted = part.measured.copy(), part.predict(record.systems[lab.role])
+    if isinstance(part, LaboratoryPart) and part.freed >= 0:
+        for values in (read, wanted):
+            values[:, part.freed] -= part.begun_elsewhere(values[:, part.freed])
+    for name, one, other in zip(part.signals, read.T, wanted.T, strict=True):
         if not record.has(name):
             continue
-        factor = compared(part.measured[:, place], predicted[:, place], lab.noise.get(name, 0.0), most)
-        if factor is not None and (factor < 0.0 or not 1.0 / FAR < factor < FAR):
+        factor = compared(one, other, lab.noise.get(name, 0.0), most)
+        if factor is not None and (factor < 0.0 or not 1.0 / TOLD < factor < TOLD):
             yield ReadingSlip(name, commands, factor)
 
 
@@ -178,3 +197,8 @@ def correlation(one: Array, other: Array, most: int) -> float:
     product = np.fft.irfft(np.fft.rfft(one, size) * np.conj(np.fft.rfft(other, size)), size) / one.size
     near = np.concatenate([product[: most + 1], product[-most:] if most else product[:0]])
     return float(near[np.argmax(np.abs(near))])
+
+
+def three_digits(value: float) -> str:
+    """A factor of one or more in three digits, without an exponent."""
+    return f"{float(f'{value:.3g}'):,.0f}" if value >= 100.0 else f"{value:.3g}"

@@ -31,9 +31,8 @@ def summary(report: Report) -> str:
         *equivalents(report),
         *not_exercised(report),
         *row("next test", report.next_test or "", 2),
-        *warnings(report),
     ]
-    return "\n".join(lines[:MOST])
+    return "\n".join([*lines, *warnings(report, MOST - len(lines))][:MOST])
 
 
 def row(label: str, text: str, most: int = 1) -> list[str]:
@@ -172,8 +171,23 @@ def not_exercised(report: Report) -> list[str]:
     return row("not shown", f"this motion could not have shown: {', '.join(names)}" if names else "", 2)
 
 
-def warnings(report: Report) -> list[str]:
-    """The first warnings."""
-    found = report.warnings
-    shown = [line for text in found[:2] for line in row("warning", text, 1)]
-    return shown + ([" " * LABEL + f"{len(found) - 2} more in the report"] if len(found) > 2 else [])
+def warnings(report: Report, most: int) -> list[str]:
+    """As many of the warnings as go whole into so many lines, the first one cut where it alone does not.
+
+    What a reader should do stands at the end of a warning.
+    """
+    found = [row("warning", text, max(1, most)) for text in report.warnings]
+    shown = 0
+    while shown < len(found) and room(found, shown + 1) <= most:
+        shown += 1
+    shown = max(1, shown)
+    left = len(found) - shown
+    lines = [line for text in found[:shown] for line in text]
+    if left <= 0:
+        return lines
+    return [*lines[: max(1, most - 1)], " " * LABEL + f"{left} more in the report"]
+
+
+def room(found: Sequence[Sequence[str]], count: int) -> int:
+    """Lines that the first warnings take, with the one that counts the others."""
+    return sum(map(len, found[:count])) + (count < len(found))

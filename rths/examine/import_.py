@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -69,9 +69,8 @@ def run(args: argparse.Namespace) -> int:
         rest = readings_at_rest(mapping, table, args.data, found)
         with outputs.writing(args.output, args.force, inputs) as path:
             write(path, mapping, found, args.data.name, ground, rest, as_is=args.as_is)
-            if not args.as_is:
-                check_slips(path, args.data)
-    told = ImportRemarks(table.form, unread, begins, rest)
+            doubts = [] if args.as_is else check_slips(path, args.data)
+    told = ImportRemarks(table.form, unread, begins, rest, doubts)
     show(args, mapping, found, told)
     return 0
 
@@ -100,6 +99,7 @@ class ImportRemarks(NamedTuple):
     unread: str  # why the plan's ground motion could not be read, empty where it was
     begins: float | None  # s of the data, at which the test was found to begin
     rest: Mapping[str, Array]  # readings (ticks,) from before the test
+    doubts: Sequence[str]  # sentences on readings of a doubtful size
 
 
 def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: ImportRemarks) -> None:
@@ -124,6 +124,7 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: Imp
             "at_rest": [*told.rest],
             "ground_unread": told.unread,
             "text": told.form and told.form._asdict(),
+            "doubts": [*told.doubts],
         }
         say(json.dumps(report) + "\n")
         return
@@ -142,6 +143,8 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: Imp
         say(f"interpolated onto the ticks, and marked so: {', '.join(found.interpolated)}\n")
     for line in said_of_time(found, told):
         say(f"{line}\n")
+    for doubt in told.doubts:
+        say(f"check: {doubt}\n")
     if told.unread:
         say(f"ground: the whole test cannot be simulated from this recording: {told.unread}\n")
     if mapping.plan.roles and not (judged or mapping.static):
@@ -242,16 +245,22 @@ def columns_of(topic: str, names: list[str], found: OnTicks, known: Known) -> di
     return columns
 
 
-def check_slips(path: Path, data: Path) -> None:
-    """Raise InputError where a unit or a sign looks wrong in a recording that was just written."""
+def check_slips(path: Path, data: Path) -> list[str]:
+    """Sentences on readings of a doubtful size in a recording that was just written.
+
+    Raises:
+        InputError: a unit or a sign looks wrong.
+    """
     from common.recording.reader import read
     from diagnosis.recorded import record
-    from diagnosis.recorded.slips import refuse_slips
+    from diagnosis.recorded.slips import doubtful, refuse_slips
 
-    run = read(path)
+    run, doubts = read(path), list[str]()
     for role in run.roles or (MASTER,):
         try:
             built = record.build(run, role=role)
         except InputError:  # too few signals for any comparison
             continue
         refuse_slips(built, data)
+        doubts += doubtful(built)
+    return doubts
