@@ -96,16 +96,16 @@ def silent(kind: Kind, system: System, ticks: int) -> Site:
 def column(system: System, deformation: Array) -> Array:
     """Force readings (ticks,) of the specimen without noise for its true deformation (ticks,) m at the ticks.
 
-    The forces of the plan's mass and dashpot follow from central differences, because a motion that is linear between
-    ticks has no acceleration.
+    The forces of a mass and of dashpots beside the specimen follow from central differences, because a motion that is
+    linear between ticks has no acceleration, and its rate is that of half an interval before.
     """
     force, result = np.empty(deformation.size), np.empty((deformation.size, 1))
     interval, effects, column = system.plan.test.interval, system.effects, system.plan.column
     sensors = readings.build(interval, ("column_force",), effects.sensors)
     steps = column_lab.substeps(interval) if specimen.depends_on_steps(effects.column) else 1
-    parts = specimen.build(replace(column, mass=0.0, damping=0.0), effects.column)
+    parts = specimen.without_rates(column, effects.column)
     play_column(parts, deformation, interval, steps, force)
-    whole = specimen.with_rates(column, force, deformation, interval)
+    whole = specimen.with_rates(column, effects.column, force, deformation, interval)
     play_readings(sensors, whole.reshape(-1, 1), interval, result)
     return result[:, 0]
 

@@ -13,7 +13,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from models.compiled import jit
+from models.registry import Array
 
 REFERENCE = 0.1  # m/s, v₀: usual in a test of dampers
 ITERATIONS = 12  # of Newton's method, which gains half of the digits or more with each one
@@ -25,6 +28,12 @@ def force(rate: float, coefficient: float, exponent: float) -> float:
     """Force (N) at a rate (m/s) of a dashpot with c = `coefficient` (N·s/m)."""
     size = coefficient * REFERENCE * (abs(rate) / REFERENCE) ** exponent
     return math.copysign(size, rate)
+
+
+def forces(rate: Array, coefficient: float, exponent: float) -> Array:
+    """`force` at each of several rates (n,) m/s."""
+    size = coefficient * REFERENCE * (np.abs(rate) / REFERENCE) ** exponent
+    return np.asarray(np.copysign(size, rate))
 
 
 @jit

@@ -97,9 +97,9 @@ class ColumnEffects:
     friction_law: float = 0.0  # 2: a slider in the place of the planned specimen
     friction_stiffness: float = 1e7  # N/m, of that slider's joint
     viscous: float = 0.0  # N·s/m
-    viscous_law: float = (
-        0.0  # 1: a power of the rate, 2: behind a spring, in the place of the planned specimen, 3: beside it
-    )
+    # 1: a power of the rate, 2: behind a spring, in the place of the planned specimen, 3: beside it, 4: as 1 in the
+    # place of the planned dashpot
+    viscous_law: float = 0.0
     viscous_exponent: float = 1.0  # of the rate
     viscous_stiffness: float = 1e7  # N/m, of that spring
     inertia: float = 0.0  # kg

@@ -11,7 +11,7 @@ from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import channels, nuisances
 from diagnosis.recorded.parts import Measured, cut, of_sites, outputs
 from diagnosis.recorded.record import Record
-from diagnosis.recorded.smoothed import smoothed, without_small_turns
+from diagnosis.recorded.smoothed import missed_at_turns, smoothed, without_small_turns
 from diagnosis.signals.noise import quantum
 from loop import replay
 from models.registry import Array
@@ -46,6 +46,8 @@ class ColumnAlone(Measured):
             self.blurred = np.array([lab.plan.column.stiffness * error])
         else:
             self.inputs = smoothed(reading)
+            if lab.plan.column.model != "linear":  # what has a memory keeps how far it went
+                self.blurred = np.array([lab.plan.column.stiffness * missed_at_turns(self.inputs)])
             self.measured = motion.through(self.measured[:, 0], self.interval)[:, None]
         machine = next(item for item in lab.kind.machines(lab.plan) if item.site == "column")
         self.nuisances = nuisances(lab, machine.parameters)

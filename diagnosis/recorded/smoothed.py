@@ -7,6 +7,7 @@ back, and forgets force.
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -21,6 +22,7 @@ MEDIAN = 0.4549  # of the square of a standard normal number
 UPPER = 0.5  # share of all frequencies of which the noise is told, and which motion must leave free
 # Standard deviations of noise, by which two rows of 10 000 differ at most: a smaller turn may be noise.
 TURN = 8.0
+SWING = 0.05  # of the range of a motion, by which it goes back at least after a turn that counts
 FADE = 1.25  # times the highest frequency of the motion, up to which a reading fades away
 
 
@@ -55,6 +57,18 @@ def without_small_turns(path: Array, error: float) -> Array:
         rises = bool(path[end] >= path[begin])
         result[begin : end + 1] = optimize.isotonic_regression(path[begin : end + 1], increasing=rises).x
     return result
+
+
+def missed_at_turns(path: Array) -> float:
+    """Rms (m) of how much farther a motion went at its turns than its rows (n,) show, of which none is at a turn.
+
+    Where the motion bends by b from row to row and turns τ rows from the next one, it goes farther by b·τ²/2.
+    """
+    places = [place for place in turns(path, SWING * float(np.ptp(path))) if 0 < place < len(path) - 1]
+    if not places:
+        return 0.0
+    bends = np.diff(path, 2)[np.array(places) - 1]
+    return 0.5 * math.sqrt(float(np.mean(np.square(bends))) / 80.0)  # 1/80: mean of τ⁴
 
 
 def turns(path: Array, least: float) -> list[int]:

@@ -152,6 +152,11 @@ def hydraulic(
             "The actuator 'servo_hydraulic' cannot have the effect 'actuator.velocity_limit' with law 1, because its "
             "valve has a dynamics of its own: give law 0 or 2, or choose 'fopdt'."
         )
+    if on_column.viscous and on_column.viscous_law:
+        raise InputError(
+            "The actuator 'servo_hydraulic' cannot have the effect 'column.viscous' with a law but 0, because its "
+            "piston moves against a dashpot that is linear: give law 0, or choose 'fopdt'."
+        )
     bare = replace(column, mass=0.0, damping=0.0)
     on_column = replace(on_column, viscous=0.0, inertia=0.0)
     behind, within = compliances(on_actuator)

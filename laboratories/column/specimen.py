@@ -49,7 +49,7 @@ LAWS = (
 )  # of yielding, in the order of `ColumnEffects.law`
 PLAYS = ORIGIN, RESTING, HELD, PARTLY, ROUNDED = range(5)  # where the gap is: see `column.slip`
 IN_PLACE = 2  # of `ColumnEffects.friction_law`: a slider in the place of the planned specimen
-BY_POWER, DASHPOT_IN_PLACE, DASHPOT_BESIDE = 1, 2, 3  # of `ColumnEffects.viscous_law`
+LINEAR, BY_POWER, DASHPOT_IN_PLACE, DASHPOT_BESIDE, INSTEAD = range(5)  # of `ColumnEffects.viscous_law`
 BENT, TWICE, TO_A_POWER = 1, 2, 3  # of `ColumnEffects.stiffening_law`
 STIFFENED_AT = 2e-3  # m, reference deformation of hardening with the square of the deformation
 DEGRADED_AT = (
@@ -77,7 +77,7 @@ class Specimen(NamedTuple):
 
 def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
     """Specimen at rest, with the plan's mass and dashpot beside those of the effects."""
-    more = effects or ColumnEffects()
+    more, column = effects or ColumnEffects(), left_standing(column, effects)
     power = more.viscous if more.viscous_law else 0.0
     more = replace(more, viscous=more.viscous - power + column.damping, inertia=more.inertia + column.mass)
     code, params, memory = specimens.pack(column.model, stiffness=column.stiffness, **column.parameters)
@@ -112,7 +112,7 @@ def build(column: Column, effects: ColumnEffects | None = None) -> Specimen:
         more.pinching_tails if more.pinching_law else 0.0,
         float(slides),
         corner(more),
-        power if more.viscous_law == BY_POWER else 0.0,
+        power if more.viscous_law in (BY_POWER, INSTEAD) else 0.0,
         power if vacant and more.viscous_law == DASHPOT_IN_PLACE else 0.0,
         more.viscous_exponent,
         more.viscous_stiffness,
@@ -183,16 +183,37 @@ def yielding(stiffness: float, effects: ColumnEffects) -> Array:
     return np.array([stiffness, bending(effects.yield_displacement), hardening, *shape])
 
 
-def with_rates(column: Column, force: Array, displacement: Array, interval: float) -> Array:
-    """Force (n,) N at a displacement (n,) m with the plan's dashpot and mass, by central differences.
+def left_standing(column: Column, effects: ColumnEffects | None) -> Column:
+    """The column without its planned dashpot where that of an effect takes its place."""
+    more = effects or ColumnEffects()
+    return replace(column, damping=0.0) if more.viscous and more.viscous_law == INSTEAD else column
 
-    `force` (n,) N is what the column gives without them, unchanged where it has neither; `interval` in s.
+
+def with_rates(
+    column: Column, effects: ColumnEffects, force: Array, displacement: Array, interval: float
+) -> Array:
+    """Force (n,) N at a displacement (n,) m with mass and dashpots beside the specimen, by central differences.
+
+    These are the plan's and those of laws 0, 1 and 4 of `column.viscous`. `force` (n,) N is what `without_rates` gives,
+    unchanged where there are none; `interval` in s.
     """
-    if not (column.mass or column.damping) or displacement.size < 2:
+    damping = left_standing(column, effects).damping
+    power = effects.viscous if effects.viscous_law in (BY_POWER, INSTEAD) else 0.0
+    damping += effects.viscous if effects.viscous_law == LINEAR else 0.0
+    if not (column.mass or damping or power) or displacement.size < 2:
         return force
     velocity = np.gradient(displacement, interval)
-    result: Array = force + column.damping * velocity + column.mass * np.gradient(velocity, interval)
+    result: Array = force + damping * velocity + column.mass * np.gradient(velocity, interval)
+    if power:
+        result += dashpot.forces(velocity, power, effects.viscous_exponent)
     return result
+
+
+def without_rates(column: Column, effects: ColumnEffects) -> Specimen:
+    """Specimen at rest without the mass and the dashpots that `with_rates` adds."""
+    if effects.viscous_law in (LINEAR, BY_POWER, INSTEAD):
+        effects = replace(effects, viscous=0.0)
+    return build(replace(column, mass=0.0, damping=0.0), effects)
 
 
 def needs_substeps(effects: ColumnEffects | None) -> bool:

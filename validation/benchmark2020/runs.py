@@ -18,7 +18,7 @@ from loop.closed_loop import Rollout, simulate
 from loop.nominal import response
 from models import indicators
 from models.registry import Array
-from models.system import Effects
+from models.system import ColumnEffects, Effects
 from validation.benchmark2020.criteria import Criteria, criteria, near, peak, rms
 from validation.benchmark2020.problem import (
     EL_CENTRO,
@@ -81,7 +81,8 @@ def stage(case: PartitionCase, motion: Motion, plants: int, seed: int) -> Stage:
 def specimen_force(plan: Plan, displacement: Array) -> Array:
     """Force (n,) N of the linear specimen under a displacement (n,) m, by central differences."""
     column = plan.column
-    return specimen.with_rates(column, column.stiffness * displacement, displacement, plan.test.interval)
+    elastic = column.stiffness * displacement
+    return specimen.with_rates(column, ColumnEffects(), elastic, displacement, plan.test.interval)
 
 
 def play(

@@ -9,8 +9,10 @@ beside the specimen and is linear, as in concrete or rubber that relaxes:
 
     f = f_column + f_m,    ḟ_m = stiffness·δ̇ − f_m·stiffness/coefficient
 
-A linear specimen with this branch is also one with a dashpot of coefficient·(1 + k/stiffness) beside it whose load cell
-has a lag of coefficient/stiffness: one cause instead of two.
+With `law` 4 the dashpot of law 1 takes the place of the planned one, as that of a fluid damper that was planned linear.
+
+A linear specimen with the branch of law 3 is also one with a dashpot of coefficient·(1 + k/stiffness) beside it whose
+load cell has a lag of coefficient/stiffness: one cause instead of two.
 
 Not to be confused with a lag of the load cell or of the displacement reading, which gives a linear specimen the same
 loop; nor with `column.friction`, whose force does not grow with speed.
@@ -36,9 +38,9 @@ EFFECT = sets(
     },
     further={
         "viscous_law": which_law(
-            3.0,
+            4.0,
             "0 with the rate, 1 with a power of it, 2 that behind a spring, in the specimen's place, "
-            "3 linear behind a spring, beside the specimen",
+            "3 linear behind a spring, beside the specimen, 4 as 1 in the planned dashpot's place",
         ),
         "viscous_exponent": Parameter(
             "exponent",
@@ -47,7 +49,7 @@ EFFECT = sets(
             least=0.1,
             most=2.5,
             sizes=(),
-            says="power of the rate of laws 1 and 2",
+            says="power of the rate of laws 1, 2 and 4",
             shape=True,
         ),
         "viscous_stiffness": Parameter(
@@ -66,6 +68,7 @@ EFFECT = sets(
         Law("with a power of the rate", {"exponent": 0.6}),
         Law("a dashpot behind a spring in the specimen's place", {"exponent": 0.6, "stiffness": 1e7}),
         Law("a dashpot behind a spring beside the specimen", {"stiffness": 1e7}),
+        Law("a power of the rate in the planned dashpot's place", {"exponent": 0.6}),
     ),
     says="force that grows with the rate of deformation",
     reference="f = f_column + coefficient·δ̇",
