@@ -25,7 +25,7 @@ def delayed(record: Record) -> Record:
     if record.stated is None or record.static or record.ticks < LEAST_TICKS:
         return record
     labs = [part for part in parts_of(record) if isinstance(part, LaboratoryPart)]
-    if any(part.free or any(one.timed or one.delay or one.average for one in part.channels) for part in labs):
+    if any(part.free or part.timed for part in labs):
         return record
     found: dict[tuple[str, str], float] = {}
     for force in (True, False):
