@@ -5,6 +5,7 @@ Forces often come through an amplifier of their own. A fault in a laboratory del
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from diagnosis.findings.found import Diagnosis
@@ -20,18 +21,21 @@ from diagnosis.signals.strength import BEYOND
 def delayed(record: Record) -> Record:
     """An imported record whose forces, or other readings, are late in all laboratories alike beside stated filters.
 
-    Where the map states nothing or a delay of its own nothing is looked for here.
+    Where the map states nothing, nothing is looked for here; where it states a delay, no more than an interval, within
+    which the logger may have read.
     """
     if record.stated is None or record.static or record.ticks < LEAST_TICKS:
         return record
     labs = [part for part in parts_of(record) if isinstance(part, LaboratoryPart)]
-    if any(part.free or part.timed for part in labs):
+    if any(part.free for part in labs):
         return record
+    most = record.plan.test.interval if any(part.timed for part in labs) else math.inf
     found: dict[tuple[str, str], float] = {}
     for force in (True, False):
         readings = of_laboratories(record, labs, force=force)
         common = in_common(readings, later(readings))
-        found |= {(one.role, name): common.channel.delay for one in common.by for name in one.names}
+        if common.channel.delay <= most:
+            found |= {(one.role, name): common.channel.delay for one in common.by for name in one.names}
     return replace(record, delayed=found)
 
 

@@ -136,10 +136,10 @@ def in_time(record: Record) -> Record:
     """The record with its readings later where those of all laboratories stand before their time alike.
 
     So does a mean over a row's time that bears the time of its beginning, or a reading in the row of the command that
-    follows it. No machine moves before its command, and one that is faster than planned is so by itself. The readings
-    may have passed filters that the map states, while a stated delay holds.
+    follows it. No machine moves before its command, and one that is faster than planned is so by itself. Filters and
+    delays that the map states do not say when between two ticks the logger read.
     """
-    labs = [part for part in parts_of(record) if isinstance(part, LaboratoryPart) and not part.timed]
+    labs = [part for part in parts_of(record) if isinstance(part, LaboratoryPart)]
     early = before_time(of_laboratories(record, labs), record.plan.test.interval)
     return record.put_right(0.0, early) if early > 0.0 else record
 

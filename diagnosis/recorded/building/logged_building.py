@@ -22,6 +22,7 @@ from models.system import System
 BALANCE = "force_balance"  # signal of a building that is judged by the balance of its forces, N
 PER_PERIOD = 12  # averages in the shortest period, of which noise is told from the motion
 FEWEST = 50  # of averages at least, by which noise is known
+BEFORE = 0.75  # share of what stated filters change, from which on they lie before the master
 SURE = 3.0  # standard deviations from which on a stated filter is taken to lie before the master
 
 
@@ -41,13 +42,13 @@ def logged(building: Building) -> LoggedBuilding:
 def before_master(plain: Array, behind: Array) -> bool:
     """Whether stated filters lie before the master, from what is left (ticks, storeys) with and without them.
 
-    If so, the second is the first, plus what the filters change, which is known; else it has nothing of that change.
-    Fourth differences keep what no parameter of a building makes; of every fifth, white noise is independent.
+    If so, the second is the first, plus what the filters change, which is known; else it has nothing of that change, or
+    half of it, where a delay brings the noise of the motion at another time in its place. Fourth differences keep what no parameter of a building makes; of every fifth, white noise is independent.
     """
     change, left = (np.diff(x, n=4, axis=0)[::5].ravel() for x in (behind - plain, behind))
     energy = float(change @ change)
     part = float(left @ change)
-    return part > max(0.5 * energy, SURE * math.sqrt(energy * float(np.mean(np.square(left)))))
+    return part > max(BEFORE * energy, SURE * math.sqrt(energy * float(np.mean(np.square(left)))))
 
 
 def white_noise(values: Array) -> float:
