@@ -115,7 +115,8 @@ def slips(record: Record) -> list[ReadingSlip]:
 def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[ReadingSlip]:
     """The slips of one laboratory whose commands were recorded, or of a column whose deformation was.
 
-    A motion without a restoring force is compared by what forces did to it from piece to piece.
+    A motion without a restoring force is compared by what forces did to it from piece to piece, where neither a phase
+    nor a bounce off a stop turns a sign round.
     """
     inputs = tuple(name for name in lab.commands if record.has(name) and np.ptp(record.signals[name]) > 0.0)
     position = lab.signal(lab.kind.channels.position)
@@ -126,13 +127,15 @@ def of_laboratory(record: Record, lab: RecordedLaboratory) -> Iterator[ReadingSl
     commands = inputs or (position,)
     most = round(LONGEST_LAG / record.plan.test.interval)
     read, wanted = part.measured.copy(), part.predict(record.systems[lab.role])
-    if isinstance(part, LaboratoryPart) and part.freed >= 0:
+    freed = part.signals[part.freed] if isinstance(part, LaboratoryPart) and part.freed >= 0 else ""
+    if isinstance(part, LaboratoryPart) and freed:
         for values in (read, wanted):
             values[:, part.freed] -= part.begun_elsewhere(values[:, part.freed])
     for name, one, other in zip(part.signals, read.T, wanted.T, strict=True):
         if not record.has(name):
             continue
-        factor = compared(one, other, lab.noise.get(name, 0.0), most)
+        opposed = ALIKE if name == freed else OPPOSED
+        factor = compared(one, other, lab.noise.get(name, 0.0), most, opposed)
         if factor is not None and (factor < 0.0 or not 1.0 / TOLD < factor < TOLD):
             yield ReadingSlip(name, commands, factor)
 
@@ -165,10 +168,12 @@ def given(motion: Array, force: Array) -> float:
     return share if share >= least and likeness < ALIKE else 0.0
 
 
-def compared(measured: Array, predicted: Array, noise: float, most: int) -> float | None:
+def compared(
+    measured: Array, predicted: Array, noise: float, most: int, opposed: float = OPPOSED
+) -> float | None:
     """The factor between two signals of the same shape, at most `most` ticks apart; None where the shapes differ.
 
-    It is negative where the signs are opposite, which needs a larger correlation.
+    It is negative where the signs are opposite, from a correlation of −`opposed` on.
     """
     read, wanted = (values - np.mean(values) for values in (measured, predicted))
     sizes = np.sqrt(np.mean(read**2)), np.sqrt(np.mean(wanted**2))
@@ -176,7 +181,7 @@ def compared(measured: Array, predicted: Array, noise: float, most: int) -> floa
         return None
     likeness = correlation(read / sizes[0], wanted / sizes[1], most)
     factor = float(sizes[0] / sizes[1])
-    if likeness <= -OPPOSED:
+    if likeness <= -opposed:
         return None if begins_alike(read, wanted, most) else -factor
     return factor if likeness >= ALIKE else None
 

@@ -48,3 +48,25 @@ def test_without_a_motion_that_was_recorded_there_is_no_stop(cases: Cases) -> No
     part.present = np.zeros_like(part.present)
     bare = fitting.at(replace(data, part=part), {}, np.zeros(len(part.nuisances)))
     assert touched(bare.data, bare, data.catalogue["damper.stroke_stop"]) is None
+
+
+def test_a_stop_that_is_met_lightly_begins_from_all_its_stiffnesses(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record = cases.record()
+    data = residuals.prepare(lab_b(record), record)
+    bare, stop = (
+        fitting.at(data, {}, np.zeros(len(data.part.nuisances))),
+        data.catalogue["damper.stroke_stop"],
+    )
+    begun = list[float]()
+
+    def at(*given: Any) -> fitting.Fit:
+        begun.append(given[1][stop.name]["stiffness"])
+        return fitting.Fit(given[0], given[1], given[2], np.zeros((data.groups, data.sigma.size)))
+
+    monkeypatch.setattr(fitting, "at", at)
+    monkeypatch.setattr(fitting, "fit", lambda *given, **_: at(*given[:3]))
+    assert touched(data, bare, stop) is not None
+    assert stop.contact is not None
+    assert set(begun) == set(stop.contact.starts)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis.recorded.smoothed import smoothed, turns, without_small_turns
+from diagnosis.recorded.smoothed import missed_at_turns, smoothed, turns, without_small_turns
 
 STEP, ROWS = 1.0 / 1024.0, 12 * 1024
 NOISE = 3e-6  # m
@@ -59,3 +59,17 @@ def test_rows_of_cycles_lose_the_turns_of_noise_and_keep_their_own(seed: int, no
     assert np.count_nonzero(np.diff(np.sign(np.diff(found)[np.diff(found) != 0.0]))) <= 8
     assert np.std(found - true) <= np.std(read - true) * (1.0 + 1e-9)
     assert np.array_equal(without_small_turns(true, noise), true)
+
+
+def test_rows_miss_of_each_turn_what_the_motion_bends_between_them() -> None:
+    """Of sines with any phase of their rows, the rms of what is between their peaks and the rows nearest to them."""
+    rng = np.random.default_rng(8)
+    places = np.arange(4000)
+    missed, told = list[float](), list[float]()
+    for phase, per_row in zip(rng.uniform(0.0, 2.0 * np.pi, 40), rng.uniform(0.05, 0.09, 40), strict=True):
+        path = np.sin(per_row * places + phase)
+        peaks = path[1:-1][(path[1:-1] > path[:-2]) & (path[1:-1] >= path[2:])]
+        missed.append(float(np.mean(np.square(1.0 - peaks))))
+        told.append(missed_at_turns(path) ** 2)
+    assert np.sqrt(np.mean(told)) == pytest.approx(np.sqrt(np.mean(missed)), rel=0.05)
+    assert missed_at_turns(np.linspace(0.0, 1.0, 50)) == 0.0

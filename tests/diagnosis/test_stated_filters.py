@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import warnings
 from collections.abc import Callable, Collection
 from dataclasses import asdict, replace
@@ -19,7 +20,7 @@ from diagnosis.fits import residuals
 from diagnosis.fits.fitting import fit
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
-from diagnosis.recorded.nuisances import through_logger
+from diagnosis.recorded.nuisances import LoggedReadings, through_logger
 from diagnosis.recorded.record import NOT_LATE, Record
 from diagnosis.report.records import Report
 from models.registry import Array
@@ -149,10 +150,48 @@ def test_forces_that_come_later_than_behind_a_stated_filter_are_the_loggers(case
     assert list(found.values()) == pytest.approx([0.004] * 2, rel=0.1)
     assert delays.delayed(later(whole, names[1:])).delayed == {}
     stated = logged(cases.record(), {"filter": asdict(BUTTERWORTH), "delay": 0.001}, lambda x: x)
-    assert delays.delayed(later(stated, names)).delayed == {}
+    assert delays.delayed(later(stated, names)).delayed == {}  # by more than an interval
 
 
 def test_a_delay_that_one_laboratory_has_is_not_the_loggers(cases: Cases) -> None:
     whole = cases.record({"actuator.delay": {"delay": 0.004}})
     passed = behind(whole, BUTTERWORTH, lambda x: BUTTERWORTH.filtered(x, 1.0 / RATE))
     assert delays.delayed(passed).delayed == {}
+
+
+@pytest.mark.parametrize(
+    "stated", [{"filter": asdict(BUTTERWORTH)}, {"delay": 0.016}], ids=["filter", "delay"]
+)
+def test_a_logger_may_read_between_ticks_whatever_its_map_states(
+    stated: dict[str, object], cases: Cases
+) -> None:
+    """What is in the row of a tick was read 1.2 ms after it, as the row of the next command shows."""
+
+    def passed(values: Array) -> Array:
+        seen = BUTTERWORTH.filtered(values, 1.0 / RATE) if "filter" in stated else shifted(values, 8.0)
+        return shifted(seen, -0.6)
+
+    found = put_right(logged(cases.record(), stated, passed))
+    assert found.early == pytest.approx(1.2e-3, rel=0.1)
+    assert put_right(logged(cases.record(), stated, lambda x: shifted(passed(x), 0.6))).early == 0.0
+
+
+def shifted(values: Array, ticks: float) -> Array:
+    """Values that come so many ticks later."""
+    places = np.arange(values.size, dtype=np.float64)
+    return np.asarray(np.interp(places - ticks, places, values))
+
+
+def test_a_delay_that_is_stated_to_be_none_is_a_statement(cases: Cases) -> None:
+    whole = cases.record()
+    assert lab_b(logged(whole, {}, lambda x: x)).free
+    assert not lab_b(logged(whole, {"timed": True}, lambda x: x)).free
+
+
+def test_only_what_is_beyond_the_time_of_a_hold_is_the_loggers() -> None:
+    one = LoggedReadings("delay", 5e-4, held=2e-3)
+    both = math.hypot(5e-4, 2e-3 / math.sqrt(3.0))
+    z = np.array([-1.0, 0.0, 1.0, 2e-3 / both])
+    assert [one.late(float(value)) for value in z] == pytest.approx(both * z)
+    assert one.late(2e-3 / both + 2.0) == pytest.approx(2e-3 + 2.0 * 5e-4)
+    assert LoggedReadings("delay", 5e-4).late(-3.0) == pytest.approx(-1.5e-3)

@@ -6,6 +6,7 @@ fewer free parameters than that law of friction, so it is named, and the report 
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from common.errors import InputError
 from rths.examine.diagnose import diagnose_file
 from rths.examine.import_ import add_arguments, run
 
@@ -54,6 +56,11 @@ def drive(teeth: float = 0.0) -> tuple[Array, Array]:
 
 def diagnosed(tmp_path: Path, force: Array, position: Array) -> dict[str, Any]:
     """The report on an imported drive."""
+    return diagnose_file(imported(tmp_path, force, position)).plain()
+
+
+def imported(tmp_path: Path, force: Array, position: Array) -> Path:
+    """The recording of a drive."""
     import argparse
 
     np.savetxt(
@@ -78,7 +85,7 @@ def diagnosed(tmp_path: Path, force: Array, position: Array) -> dict[str, Any]:
         str(tmp_path / "drive.mcap"),
     ]
     assert run(parser.parse_args(words)) == 0
-    return diagnose_file(tmp_path / "drive.mcap").plain()
+    return tmp_path / "drive.mcap"
 
 
 @pytest.mark.slow
@@ -99,3 +106,30 @@ def test_friction_is_not_the_explanation_of_a_motor_with_teeth(tmp_path: Path) -
     report = diagnosed(tmp_path, *drive(teeth=1.0))
     assert report["status"] == "partly_explained"
     assert "damper.friction" in report["which"][0]["effects"]
+
+
+@pytest.mark.parametrize(
+    ("push", "length", "message"),
+    [
+        (-1.0, 1.0, "'damper_stroke' has the opposite sign of what the plan predicts from damper_command"),
+        (1.0, 1e3, "is 490 times what the plan predicts from damper_command: check the units of its column"),
+    ],
+    ids=["sign of the force", "millimetres"],
+)
+def test_a_slip_is_seen_by_what_forces_did_to_a_motion_without_a_spring(
+    push: float, length: float, message: str, tmp_path: Path
+) -> None:
+    force, position = drive()
+    with pytest.raises(InputError, match=re.escape(message)):
+        imported(tmp_path, push * force, length * position)
+
+
+def test_volts_taken_for_newtons_are_told_and_imported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    force, position = drive()
+    imported(tmp_path, force / 35.0, position)
+    assert (
+        "check: 'damper_stroke' is 17.1 times what the plan predicts from damper_command"
+        in capsys.readouterr().out
+    )

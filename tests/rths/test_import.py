@@ -105,7 +105,7 @@ SLIPS = {
     "millimetres for metres": (
         1e3 * LATE,
         FORCE,
-        "'column_displacement' is 1.01e+03 times what the plan predicts",
+        "'column_displacement' is 1,010 times what the plan predicts",
     ),
     "kilonewtons for newtons": (
         LATE,
@@ -155,7 +155,7 @@ def test_a_force_without_a_command_is_checked_against_the_measured_deformation(
     rows = 'column_displacement = { column = "y" }\ncolumn_force = { column = "f", unit = "kN" }\n'
     assert bring(table("t,y,f", TIMES, LATE, FORCE), rows)[0] == 2
     assert (
-        "'column_force' is 1/1e+03 of what the plan predicts from column_displacement"
+        "'column_force' is 1/1,000 of what the plan predicts from column_displacement"
         in capsys.readouterr().err
     )
 

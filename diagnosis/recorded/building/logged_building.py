@@ -43,7 +43,8 @@ def before_master(plain: Array, behind: Array) -> bool:
     """Whether stated filters lie before the master, from what is left (ticks, storeys) with and without them.
 
     If so, the second is the first, plus what the filters change, which is known; else it has nothing of that change, or
-    half of it, where a delay brings the noise of the motion at another time in its place. Fourth differences keep what no parameter of a building makes; of every fifth, white noise is independent.
+    half of it, where a delay brings the noise of the motion at another time in its place. Fourth differences keep what
+    no parameter of a building makes; of every fifth, white noise is independent.
     """
     change, left = (np.diff(x, n=4, axis=0)[::5].ravel() for x in (behind - plain, behind))
     energy = float(change @ change)
