@@ -59,10 +59,11 @@ def run(args: argparse.Namespace) -> int:
         from rths.examine.importing.import_map import load_map
         from rths.examine.importing.onto_ticks import on_ticks
         from rths.examine.importing.rest import readings_at_rest
-        from rths.examine.importing.time_base import put_together
+        from rths.examine.importing.time_base import put_together, without_repeats
 
         stated = load_map(args.map)
         table = put_together(stated, tabular.read_table(args.data, stated.form), args.data)
+        table, repeated = without_repeats(stated, table, args.data)
         mapping, begins = begun(stated, table, args.data)
         found = on_ticks(mapping, table, args.data, as_is=args.as_is)
         ground, unread = ground_of(mapping, found)
@@ -70,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         with outputs.writing(args.output, args.force, inputs) as path:
             write(path, mapping, found, args.data.name, ground, rest, as_is=args.as_is)
             doubts = [] if args.as_is else check_slips(path, args.data)
-    told = ImportRemarks(table.form, unread, begins, rest, doubts)
+    told = ImportRemarks(table.form, unread, begins, rest, doubts, repeated)
     show(args, mapping, found, told)
     return 0
 
@@ -100,6 +101,7 @@ class ImportRemarks(NamedTuple):
     begins: float | None  # s of the data, at which the test was found to begin
     rest: Mapping[str, Array]  # readings (ticks,) from before the test
     doubts: Sequence[str]  # sentences on readings of a doubtful size
+    repeated: int  # rows that a logger wrote twice
 
 
 def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: ImportRemarks) -> None:
@@ -125,6 +127,7 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: Imp
             "ground_unread": told.unread,
             "text": told.form and told.form._asdict(),
             "doubts": [*told.doubts],
+            "repeated": told.repeated,
         }
         say(json.dumps(report) + "\n")
         return
@@ -162,6 +165,8 @@ def said_of_time(found: OnTicks, told: ImportRemarks) -> Iterator[str]:
     if any(found.ends):
         before, behind = found.ends
         yield f"left out, as not all columns have begun or go on there: {before} rows at the begin, {behind} at the end"
+    if told.repeated:
+        yield f"left out, as they repeat the row before them in every column: {told.repeated} rows"
     if found.left_out:
         yield f"left out, as a column has no number there: {found.left_out} rows"
     if found.gaps:

@@ -34,6 +34,8 @@ OUTERMOST = 3.0
 # Standard deviations from which on noise follows the motion: with all inputs and scales looked at, 4.6 was the most
 # that 250 readings of clean laboratories behind loggers had.
 SURE = 6.0
+SYMMETRIC = 1e-3  # skewness below which it changes nothing
+ALIKE = 1.2  # times the noise of one scale, below which that of the next one is as loud
 # Steps over the noise from which on the error of rounding, which depends on the motion, shows.
 ROUNDED = 0.5
 MEANS = ("delay", "lag", "gain")  # of readings: what an error by chance that follows the motion is on average
@@ -45,6 +47,7 @@ class Uneven(NamedTuple):
     ratio: float  # rms of what follows over that of the noise where the part moves least
     significance: float  # standard deviations above noise that is steady
     scale: int  # ticks over which it shows most
+    usual: float = 0.0  # rms of the noise at that scale
 
 
 STEADY = Uneven(0.0, 0.0, 0)
@@ -70,13 +73,15 @@ def uneven(fit: Fit) -> list[Uneven]:
 def over_scales(noise: Array, motions: Sequence[Array], erring: Array) -> Uneven:
     """How much of a noise (ticks,) follows motions beyond an error `erring` (ticks,).
 
-    These are the `amplitudes` of each of the scales.
+    These are the `amplitudes` of each of the scales. Two of them together say more where the noise is as loud in both;
+    slow noise, which is louder in longer means, is largely the same in them.
     """
     pairs = zip(SCALES, motions, strict=True)
     found = [one for size, rows in pairs if (one := at_scale(noise, rows, erring, size)) is not None]
     together = [
         Uneven(max(a.ratio, b.ratio), (a.significance + b.significance) / math.sqrt(2.0), a.scale)
         for a, b in itertools.pairwise(found)
+        if b.usual < ALIKE * a.usual
     ]
     return max([*found, *together], key=lambda one: one.significance, default=STEADY)
 
@@ -93,7 +98,7 @@ def at_scale(noise: Array, rows: Array, erring: Array, size: int) -> Uneven | No
     still, loud = float(energy[row <= low].mean()), float(energy[row >= high].mean())
     beside = float(np.mean(np.square(differences(erring, size)))) / usual**2
     more = (loud - still - beside) / still if still > 0.0 else 0.0
-    return Uneven(math.sqrt(max(more, 0.0)), significance, size)
+    return Uneven(math.sqrt(max(more, 0.0)), significance, size, usual)
 
 
 def differences(values: Array, size: int) -> Array:
@@ -118,6 +123,7 @@ def follows(energy: Array, motions: Array) -> tuple[float, Array]:
 
     These are those of two series that are independent and remember: M. S. Bartlett, Journal of the Royal Statistical
     Society 98 (1935). They make no correlation more significant, so that what falls short without them is not asked.
+    Where few samples hold most of a motion, chance has the skewed tail of their energy.
     """
     count, reach = energy.size, energy.size // 4
     one, others = standard(energy), standard(motions)
@@ -128,9 +134,23 @@ def follows(energy: Array, motions: Array) -> tuple[float, Array]:
             break
         other = others[:, column]
         shared = correlations(one - along[column] * other, reach) @ correlations(other, reach)
-        found = float(along[column]) * math.sqrt(count / max(1.0, 1.0 + 2.0 * float(shared)))
+        plain = float(along[column]) * math.sqrt(count / max(1.0, 1.0 + 2.0 * float(shared)))
+        skew = float(np.mean(one**3) * np.mean(other**3)) / math.sqrt(count)
+        found = unskewed(plain, skew)
         best, place = max((best, place), (found, int(column)))
     return best, motions[:, place]
+
+
+def unskewed(deviations: float, skew: float) -> float:
+    """Deviations of the normal distribution that are as rare as those of a gamma distribution with a skewness.
+
+    E. B. Wilson and M. M. Hilferty, Proceedings of the National Academy of Sciences 17 (1931), 684-688.
+    """
+    if skew < SYMMETRIC or deviations <= 0.0:
+        return deviations
+    shape = 4.0 / skew**2
+    root = (1.0 + deviations / math.sqrt(shape)) ** (1.0 / 3.0)
+    return (root - 1.0 + 1.0 / (9.0 * shape)) * 3.0 * math.sqrt(shape)
 
 
 def standard(values: Array) -> Array:

@@ -17,6 +17,7 @@ from report.text.text_form import is_number
 from rths.examine.importing.import_map import ImportMap, in_unit
 
 ENDS = 0.02  # share of the rows that may come before a column begins, or behind its end
+REPEATED = 0.01  # share of the rows that a busy logger may have written twice
 FOR_A_SPLINE = 4  # rows at least
 EVENLY = 1.5  # usual distances of a channel's own rows, from which on one is missing
 
@@ -47,6 +48,27 @@ def put_together(mapping: ImportMap, table: DataTable, data: Path) -> DataTable:
         return np.delete(whole, second)
 
     return table._replace(columns={name: one_row(column) for name, column in table.columns.items()})
+
+
+def without_repeats(mapping: ImportMap, table: DataTable, data: Path) -> tuple[DataTable, int]:
+    """The data without rows that repeat the row before them in every column of the map, and how many those are.
+
+    A logger that was busy writes its last row again. The noise of several readings does not come twice; where many rows
+    repeat, the logger is faster than what it reads, or nothing moves.
+    """
+    columns = [pick(table, source.column, data) for source in mapping.signals.values() if source.column]
+    moving = [column for column in columns if np.any(column != column[:1])]
+    if mapping.static or not mapping.time or len(moving) < 2 or len({column.size for column in columns}) > 1:
+        return table, 0
+    again = np.append(False, np.all([column[1:] == column[:-1] for column in columns], axis=0))
+    count = int(np.count_nonzero(again))
+    if not 0 < count <= REPEATED * again.size:
+        return table, 0
+    left = {
+        name: column[~again] if column.size == again.size else column
+        for name, column in table.columns.items()
+    }
+    return table._replace(columns=left), count
 
 
 def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, Any]:
