@@ -57,6 +57,15 @@ class Contents:
         for _, channel in sorted(self._channels.items()):  # in the order in which they were registered
             if channel.topic.startswith("rths/"):
                 _take(run, channel, self._schemas, messages.get(channel.topic, []))
+        if _of_master_alone(run) and not any("slaves" in one.metadata for one in self._channels.values()):
+            run.roles = ()
+
+
+def _of_master_alone(run: Run) -> bool:
+    """Whether a recording holds a master that used no slave's force, and no other topic."""
+    return set(run.columns) == {MASTER} and not run.columns[MASTER].keys() & signals.shared(
+        signals.TOPICS[MASTER]
+    )
 
 
 def _check(run: Run) -> None:

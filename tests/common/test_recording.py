@@ -10,10 +10,12 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from common.errors import InputError
 from common.recording import chunks, index
 from common.recording.reader import read
+from common.recording.schema import schema_file
 from common.recording.writer import Recording
 from common.signals import TOPICS, FieldType
 
@@ -233,3 +235,20 @@ def test_an_events_bytes_do_not_depend_on_the_order_of_its_values(tmp_path: Path
         recording.add("event", 0, 0, (0.0, "master", "info", "exchange", "a sentence", table))
         recording.close({})
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+@pytest.mark.parametrize("used", [True, False], ids=["with the force of a slave", "of a master alone"])
+def test_a_recording_that_names_no_slaves_has_one_where_its_topics_show_it(
+    tmp_path: Path, used: bool
+) -> None:
+    """As a recording that others write by the contract, whose channels say nothing of slaves."""
+    alone = tuple(row for row in TOPICS["master"] if used or not row.slaves)
+    with (tmp_path / "own.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        described = descriptor_pb2.FileDescriptorSet(file=[schema_file("master", alone, 1)])
+        schema = writer.register_schema("rths.Master", "protobuf", described.SerializeToString())
+        channel = writer.register_channel("rths/trial/master", "protobuf", schema)
+        writer.add_message(channel, 0, b"", 0)
+        writer.finish()
+    assert read(tmp_path / "own.mcap").roles == (("slave",) if used else ())
