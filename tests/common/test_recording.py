@@ -250,5 +250,5 @@ def test_a_recording_that_names_no_slaves_has_one_where_its_topics_show_it(
         schema = writer.register_schema("rths.Master", "protobuf", described.SerializeToString())
         channel = writer.register_channel("rths/trial/master", "protobuf", schema)
         writer.add_message(channel, 0, b"", 0)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     assert read(tmp_path / "own.mcap").roles == (("slave",) if used else ())
