@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from functools import lru_cache
 from typing import Any
 
@@ -62,10 +63,18 @@ class Contents:
 
 
 def _of_master_alone(run: Run) -> bool:
-    """Whether a recording holds a master that used no slave's force, and no other topic."""
-    return set(run.columns) == {MASTER} and not run.columns[MASTER].keys() & signals.shared(
-        signals.TOPICS[MASTER]
-    )
+    """Whether a recording holds the topic of a master alone, and a plan without a slave."""
+    if set(run.columns) != {MASTER}:
+        return False
+    try:
+        tables = tomllib.loads(run.metadata["plan"]["toml"])
+        return bool(tables["slave"]["kind"] == "none")
+    except (
+        KeyError,
+        TypeError,
+        tomllib.TOMLDecodeError,
+    ):  # whoever needs the plan says what is wrong with it
+        return False
 
 
 def _check(run: Run) -> None:

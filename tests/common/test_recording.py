@@ -237,18 +237,20 @@ def test_an_events_bytes_do_not_depend_on_the_order_of_its_values(tmp_path: Path
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
-@pytest.mark.parametrize("used", [True, False], ids=["with the force of a slave", "of a master alone"])
-def test_a_recording_that_names_no_slaves_has_one_where_its_topics_show_it(
-    tmp_path: Path, used: bool
+@pytest.mark.parametrize(
+    ("plan", "roles"), [('[slave]\nkind = "none"', ()), ("[slave]", ("slave",)), ("[", ("slave",))]
+)
+def test_a_recording_that_names_no_slaves_has_none_where_its_plan_has_none(
+    tmp_path: Path, plan: str, roles: tuple[str, ...]
 ) -> None:
     """As a recording that others write by the contract, whose channels say nothing of slaves."""
-    alone = tuple(row for row in TOPICS["master"] if used or not row.slaves)
     with (tmp_path / "own.mcap").open("wb") as stream:
         writer = Writer(stream)
         writer.start()
-        described = descriptor_pb2.FileDescriptorSet(file=[schema_file("master", alone, 1)])
+        described = descriptor_pb2.FileDescriptorSet(file=[schema_file("master", TOPICS["master"], 1)])
         schema = writer.register_schema("rths.Master", "protobuf", described.SerializeToString())
         channel = writer.register_channel("rths/trial/master", "protobuf", schema)
         writer.add_message(channel, 0, b"", 0)
+        writer.add_metadata("plan", {"toml": plan})
         writer.finish()  # type: ignore[no-untyped-call]
-    assert read(tmp_path / "own.mcap").roles == (("slave",) if used else ())
+    assert read(tmp_path / "own.mcap").roles == roles

@@ -149,8 +149,27 @@ def test_rows_of_two_loggers_at_one_time_are_one_row(bring: Any, capsys: Any) ->
     assert known(run).channel("master", "column_displacement").rate == pytest.approx(100.0 / 3.0)
     capsys.readouterr()
     twice = [column[np.r_[0, 0, 1 : column.size]] for column in (TIMES, COMMAND, LATE)]
+    twice[2][1] += 1e-3
     assert bring(table("t,u,y", *twice), DRIVE)[0] == 2
     assert "does not increase at row 2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("stuck", [True, False], ids=["at the same time", "at the next time"])
+def test_rows_that_a_logger_wrote_twice_are_left_out(bring: Any, capsys: Any, stuck: bool) -> None:
+    motion, read = COMMAND.copy(), LATE.copy()
+    motion[100], read[100] = motion[99], read[99]
+    times = np.where(np.arange(TIMES.size) == 100, TIMES[99], TIMES) if stuck else TIMES
+    code, run = bring(table("t,u,y", times, motion, read), DRIVE)
+    assert code == 0
+    assert "left out, as they repeat the row before them in every column: 1 rows" in capsys.readouterr().out
+    found, smooth = run.columns["master"]["column_displacement"], 1e-3 * LATE
+    assert abs(found[100] - smooth[100]) < 0.05 * abs(smooth[100] - smooth[99])
+
+
+def test_rows_of_a_logger_that_is_faster_than_what_it_reads_stay(bring: Any, capsys: Any) -> None:
+    twice = np.repeat(np.arange(TIMES.size // 2), 2)
+    assert bring(table("t,u,y", TIMES[: twice.size], COMMAND[twice], LATE[twice]), DRIVE)[0] == 0
+    assert "repeat the row before them" not in capsys.readouterr().out
 
 
 def test_rows_where_one_of_two_loggers_has_not_begun_or_has_ended_are_left_out(
