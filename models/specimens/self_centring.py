@@ -27,14 +27,14 @@ class SelfCentringParams(NamedTuple):
     stiffness: float  # k, N/m
     yield_displacement: float  # δ_a, m, deformation where the upper line bends
     hardening: float = 0.0  # α, stiffness beyond the bend over the elastic stiffness
-    loop: float = 0.5  # β, height of the flag over the force at the bend
+    loop: float = 0.5  # β, by which the lower line bends earlier; the flag is β·(1 − α)·k·δ_a high
 
 
 RULES = {
     "stiffness": Rule("elastic stiffness", "N/m", least=0.0),
     "yield_displacement": Rule("deformation where the upper line bends", "m", above=0.0),
     "hardening": Rule("stiffness beyond the bend over elastic stiffness", above=-1.0, most=1.0),
-    "loop": Rule("height of the flag over the force at the bend", least=0.0, most=1.0),
+    "loop": Rule("share of the upper line's bend by which the lower one bends earlier", least=0.0, most=1.0),
 }
 STIFFNESS, YIELD_DISPLACEMENT, HARDENING, LOOP = range(4)
 

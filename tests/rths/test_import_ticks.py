@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.plan.plan import Plan
+from rths.examine.importing.import_map import lab_signals
+from rths.examine.importing.onto_ticks import TickGrid
 from tests.rths.imports import COMMAND, DRIVE, LATE, PLAN, TIMES, known, table
 
 
@@ -206,3 +209,13 @@ def test_sequence_numbers_are_held_between_rows_and_incomplete_time_stamps_are_l
     assert np.all(run.columns["latency"]["command_one_way"] == 1e-3)
     assert np.all(np.isnan(run.columns["latency"]["round_trip"]))
     assert "link:" not in capsys.readouterr().out
+
+
+def test_as_many_ticks_as_are_wanted_are_not_those_ticks() -> None:
+    """A logger that began a tick early and passed over one later has as many rows as there are ticks."""
+    interval = 0.002
+    grid = TickGrid(interval * np.arange(40.0), interval, None)
+    seen = interval * np.r_[-1.0, np.arange(20.0), np.arange(21.0, 40.0)]
+    row = lab_signals(Plan())["displacement"][1]
+    assert grid.between(seen, 3.0 * seen, row, None) == pytest.approx(3.0 * grid.t, abs=1e-12)
+    assert grid.between(grid.t, 3.0 * grid.t, row, None) == pytest.approx(3.0 * grid.t, abs=0.0)

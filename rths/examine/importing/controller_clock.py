@@ -96,7 +96,7 @@ class ControllerClock(NamedTuple):
         after = np.clip(np.searchsorted(times, middle), 1, times.size - 1)
         before = after - 1
         nearest = np.where(middle - times[before] < times[after] - middle, before, after)
-        there = np.floor(self.places(times[nearest]) + ON_TICK) == np.rint(t / self.interval)
+        there = np.floor(self.places(times[nearest]) + self.slack) == np.rint(t / self.interval)
         return t[there], values[nearest[there]]
 
     def seen(self, times: Array, values: Array) -> tuple[Array, Array]:

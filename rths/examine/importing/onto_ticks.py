@@ -92,7 +92,7 @@ class TickGrid(NamedTuple):
 
     def between(self, when: Array, values: Array, row: Signal, known: Array | None) -> Array:
         """What a channel has at all ticks by its values (m,) at some of them, at `when` (m,), s."""
-        if when.size == self.t.size:
+        if when.size == self.t.size and np.max(np.abs(when - self.t)) < ON_TICKS * self.interval:
             return values
         if known is None or known.size < self.t.size:
             return moved(when, values, self.t, row)
