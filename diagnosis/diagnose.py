@@ -192,6 +192,7 @@ def remarks(
         *(verdict.own.text for verdict in verdicts if verdict.own is not None and verdict.own.text),
         *doubted(verdicts),
         *drifting(verdicts),
+        *calibrated(verdicts),
         *where.undecided(verdicts),
     ]
 
@@ -206,7 +207,12 @@ def with_own_error(verdict: PartVerdict, aside: Collection[str]) -> PartVerdict:
     if part is not None and verdict.outcome == "explained":
         return uneven_noise.doubting(verdict, part, aside)
     slight = verdict.outcome == "unknown" and not verdict.effects and small(search)
-    if part is None or verdict.drifting or not (slight or verdict.outcome in WITHOUT_GAP):
+    if (
+        part is None
+        or verdict.drifting
+        or verdict.calibrated
+        or not (slight or verdict.outcome in WITHOUT_GAP)
+    ):
         return verdict
     own = (
         outliers.own_error(verdict, part)
@@ -309,6 +315,16 @@ def drifting(verdicts: Sequence[PartVerdict]) -> list[str]:
         f"The zero of {signal} drifts by less than can be seen beside its noise, which counts as no gap."
         for verdict in verdicts
         for signal in verdict.drifting
+    ]
+
+
+def calibrated(verdicts: Sequence[PartVerdict]) -> list[str]:
+    """A sentence for each reading whose gain is taken for the calibration of its channel."""
+    return [
+        f"The gain of {signal} is off by no more than the channels of a data logger are as a rule, which counts as no "
+        "gap: state its `calibration` in the import map to have it judged."
+        for verdict in verdicts
+        for signal in verdict.calibrated
     ]
 
 

@@ -62,6 +62,7 @@ class PartVerdict:
     joined: Search | None = None  # in all recordings, where several were searched at once
     doubted: str = ""  # the reading of which the gap might also be slow noise, empty for none
     drifting: tuple[str, ...] = ()  # the readings whose zeros drift, where that is all of the gap
+    calibrated: tuple[str, ...] = ()  # the readings whose gains are those of a logger's channels, likewise
     own: OwnError | None = None  # the gap, where it is an error of one reading by itself
 
     @property
@@ -81,6 +82,9 @@ def judge(search: Search) -> PartVerdict:
     if drifting := drifting_zeros(search):
         bare = replace(search, chosen=search.commissioned, alternatives=())
         return PartVerdict(bare, "tolerances", 1.0, (), (), drifting=drifting)
+    if calibrated := within_calibration(search):
+        bare = replace(search, chosen=search.commissioned, alternatives=())
+        return PartVerdict(bare, "tolerances", 1.0, (), (), calibrated=calibrated)
     if search.chosen.names and set(of_no_size(search.chosen)) == set(search.chosen.names):
         bare = replace(search, chosen=search.commissioned, alternatives=())
         if (outcome := without_effects(bare)) != "unknown":
@@ -216,6 +220,24 @@ def trifling(search: Search) -> bool:
         return False
     sites = {item.site for item in ranked(search.commissioned) if item.cost < APART}
     return not sites <= {item.site for item in effects}
+
+
+def within_calibration(search: Search) -> tuple[str, ...]:
+    """The readings, by signal, whose gains are all that is named and no more than a logger's channels are off.
+
+    Empty where a calibration is stated, or where rths recorded.
+    """
+    data, fit = search.data, search.chosen
+    known = [
+        item.tolerance
+        for item in data.part.nuisances
+        if isinstance(item, LoggedReadings) and item.parameter == "gain"
+    ]
+    effects = [data.catalogue[name] for name in fit.names]
+    if not known or not effects or any(item.fault != "gain" for item in effects):
+        return ()
+    gains = [abs(fit.values[item.name]["factor"] - 1.0) for item in effects]
+    return tuple(item.signal for item in effects) if max(gains) < min(known) else ()
 
 
 def misplaced(search: Search) -> bool:
