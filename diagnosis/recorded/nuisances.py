@@ -298,6 +298,18 @@ def of_filters(
     return tuple(result)
 
 
+def between_rows(lab: RecordedLaboratory, stated: Sequence[ImportedChannel]) -> tuple[LoggedReadings, ...]:
+    """By how much all readings are late beyond stated delays, where their rows lie between ticks.
+
+    What a controller holds tells between which two rows a tick is, not where.
+    """
+    rates = [one.rate for one in stated if one.interpolated and one.rate > 0.0]
+    if not rates:
+        return ()
+    half = 0.5 / max(rates)
+    return (LoggedReadings("delay", EVENLY * half, lab, lab.kind.channels.names, least=-2.0 * half),)
+
+
 def nothing_stated(mapped: ImportedData | None, lab: RecordedLaboratory) -> bool:
     """Whether the import map states neither filter nor mean nor delay for any channel of a laboratory."""
     return not any(one.filter or one.timed or one.delay or one.average for one in channels(mapped, lab))

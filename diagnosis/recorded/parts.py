@@ -22,6 +22,7 @@ from diagnosis.recorded.nuisances import (
     CALIBRATED,
     LoggedReadings,
     Nuisance,
+    between_rows,
     calibrations,
     channels,
     interpolated,
@@ -355,7 +356,7 @@ class LaboratoryPart:
         """
         lab, held = self.lab, self._interval if self.steps else 0.0
         retimed = self.retimed or max(late.force.about, late.motion.about) > BETWEEN
-        delays = of_filters(lab, self.channels, held)
+        delays = of_filters(lab, self.channels, held) or between_rows(lab, self.channels)
         if self.free:
             delays = of_logger(lab, late, spread, held, self.early)
         if any(channel.calibration > 0.0 for channel in self.channels):

@@ -188,6 +188,19 @@ def test_a_delay_that_is_stated_to_be_none_is_a_statement(cases: Cases) -> None:
     assert not lab_b(logged(whole, {"timed": True}, lambda x: x)).free
 
 
+def test_rows_between_ticks_leave_open_when_a_tick_was(cases: Cases) -> None:
+    """Between two rows of a logger of 1000 Hz a tick may be anywhere, by 0.29 ms in the standard deviation."""
+    between: dict[str, object] = {"delay": 0.016, "interpolated": True, "rate": 1000.0}
+    part = lab_b(logged(cases.record(), between, lambda x: x)).logged(NOT_LATE)
+    late = [one for one in part.nuisances if isinstance(one, LoggedReadings) and one.parameter == "delay"]
+    assert [(one.tolerance, one.least) for one in late] == [pytest.approx((1e-3 / math.sqrt(12.0), -1e-3))]
+    assert late[0].signals == part.lab.kind.channels.names
+    on_ticks = lab_b(logged(cases.record(), {"delay": 0.016}, lambda x: x)).logged(NOT_LATE)
+    assert [one for one in on_ticks.nuisances if isinstance(one, LoggedReadings)] == [
+        one for one in part.nuisances if one.parameter == "gain"
+    ]
+
+
 def test_only_what_is_beyond_the_time_of_a_hold_is_the_loggers() -> None:
     one = LoggedReadings("delay", 5e-4, held=2e-3)
     both = math.hypot(5e-4, 2e-3 / math.sqrt(3.0))
