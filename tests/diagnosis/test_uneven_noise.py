@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from diagnosis.diagnose import diagnose, machines_first, with_own_error
 from diagnosis.findings.certainty.trust import share_likeliest
@@ -173,3 +174,36 @@ def test_loud_noise_beside_an_effect_is_its_sensors_only_where_it_is_steady(
     assert (told.outcome, left) == (("partly", {"damper_force"}) if follows else ("explained", set()))
     assert machines_first(loud, [explained], [NOISY])[1] == ([] if follows else [NOISY])
     assert uneven_noise.beside_effects(explained, {"table_displacement"}) == (explained, set())
+
+
+@pytest.mark.parametrize("skewness", [0.2, 0.6, 1.5])
+def test_few_loud_samples_are_as_rare_as_a_skewed_sum_makes_them(skewness: float) -> None:
+    """SciPy's gamma distribution of that skewness, in standard deviations of the normal one."""
+    shape = 4.0 / skewness**2
+    for deviations in (1.0, 3.0, 6.0):
+        tail = stats.gamma.sf(shape + deviations * np.sqrt(shape), shape)
+        expected = float(stats.norm.isf(tail))
+        assert uneven_noise.unskewed(deviations, skewness) == pytest.approx(expected, abs=0.05)
+    assert uneven_noise.unskewed(5.0, 0.0) == 5.0
+
+
+def test_a_pulse_over_few_samples_makes_loud_ones_follow_it_less() -> None:
+    energy, motion = np.square(white(3)), np.zeros((TICKS, 1))
+    motion[100:104], energy[100:104] = 1.0, 8.0
+    long = np.zeros((TICKS, 1))
+    long[100:1700], steady = 1.0, energy.copy()
+    steady[100:1700] *= 1.5
+    assert uneven_noise.follows(energy, motion)[0] < uneven_noise.SURE < 8.0
+    assert uneven_noise.follows(steady, long)[0] > uneven_noise.SURE
+
+
+@pytest.mark.parametrize(("louder", "together"), [(1.0, True), (1.5, False)])
+def test_two_scales_of_slow_noise_are_not_two_witnesses(
+    louder: float, together: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def at_scale(_noise: Array, _rows: Array, _erring: Array, size: int) -> uneven_noise.Uneven:
+        return uneven_noise.Uneven(1.0, 5.0, size, louder ** np.log2(size))
+
+    monkeypatch.setattr(uneven_noise, "at_scale", at_scale)
+    found = uneven_noise.over_scales(white(1), [white(2)] * len(uneven_noise.SCALES), white(3))
+    assert found.significance == pytest.approx(5.0 * np.sqrt(2.0) if together else 5.0)

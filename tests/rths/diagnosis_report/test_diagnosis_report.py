@@ -104,6 +104,17 @@ def test_the_terminal_summary_contains_the_main_findings() -> None:
     assert "column.stiffness" not in text
 
 
+def test_the_terminal_shows_as_many_warnings_as_go_whole_into_its_lines() -> None:
+    short, long = "Few words.", "Many words that end with what to do. " * 9
+    report = dataclasses.replace(read(fresh("no_gap")), warnings=(long, short))
+    assert " ".join(f"{long} warning {short}".split()) in " ".join(summary(report).split())
+    many = summary(dataclasses.replace(report, warnings=(long,) * 20)).split("\n")
+    assert len(many) <= 25
+    assert re.fullmatch(r" +1\d more in the report", many[-1])
+    assert not [line for line in many if line.endswith("…")]
+    assert "warning" not in summary(dataclasses.replace(report, warnings=()))
+
+
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages without pictures, which are the slow part."""
