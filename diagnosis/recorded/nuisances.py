@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from common.recording.imported import NOTHING_STATED, ImportedChannel, ImportedD
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.record import Late, Record
 from models.registry import Array
-from models.system import System
+from models.system import SensorEffects, System
 
 # Standard deviations within which a logger's channels are expected. LATE: a filter of 40 Hz, usual before sampling at
 # 100 Hz to 200 Hz, delays by 4 ms. ALIKE and UNLIKE: channels of one logger differ by a quarter of an interval or by
@@ -85,18 +85,25 @@ class ChannelGain(Nuisance):
 
 @dataclass(frozen=True)
 class LoggedForce(Nuisance):
-    """Delay (s) or gain with which a logger recorded a force that the master used."""
+    """Delay (s), gain, zero (N) or drift of it (N/s) with which a logger recorded a force that the master used."""
 
     of_record = True
     signal: str = ""  # of the force's reading
     about: float = 0.0  # s, the delay at z = 0
 
     def moved(self, system: System, z: float) -> System:
-        """The system whose reading of that force has the logger's delay or gain."""
+        """The system whose reading of that force has the logger's delay, gain, zero or drift."""
         value = z * self.tolerance
         if self.parameter == "delay":
             return system.recorded(self.signal, delay=self.about + value)
-        return system.recorded(self.signal, gain=1.0 + value)
+        if self.parameter == "gain":
+            return system.recorded(self.signal, gain=1.0 + value)
+        own = system.effects.sensors.get(self.signal, SensorEffects())
+        made = {
+            **system.effects.sensors,
+            self.signal: replace(own, **{self.parameter: getattr(own, self.parameter) + value}),
+        }
+        return replace(system, effects=replace(system.effects, sensors=made))
 
 
 @dataclass(frozen=True)

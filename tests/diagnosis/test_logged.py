@@ -378,14 +378,3 @@ def test_noise_that_the_motion_has_and_the_log_has_not_moves_no_parameter(cases:
     assert np.max(np.abs(moved(found))) < 0.3
     found.of_motion = 0.0
     assert np.min(moved(found)[:3]) < -0.8
-
-
-@pytest.mark.parametrize(("before", "late"), [(True, 8), (True, 1), (False, 8), (False, 1)], ids=str)
-def test_a_stated_delay_lies_before_the_master_or_behind_it(before: bool, late: int) -> None:
-    """What a balance leaves is the noise of the motion less that of the recorded force."""
-    rng = np.random.default_rng(late)
-    motion, force = rng.normal(size=(2, 20_000))
-    used = motion if before else force  # a master that read the force with this noise moved by it
-    plain = (motion - used)[:, None] + 0.1 * rng.normal(size=(motion.size, 1))
-    behind = plain + (np.roll(motion, late) - motion)[:, None]
-    assert logged_building.before_master(plain, behind) == before

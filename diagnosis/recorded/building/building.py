@@ -58,6 +58,7 @@ class Building(Measured):
         self._inputs = (read[0], read[1], used)
         self._force = own.kind.channels.force if own else ""
         self.sources = (self._force, *came) if own else ()  # forces used, the own laboratory's first
+        self._noise = record.planned_noise.get(self._force, 0.0)  # N, of the own laboratory's force
         self.linear = plan.structure.columns.model == "linear"
         self._plan, self.whole = plan, record.has(*MOTION)
         self._scale = own.kind.coupling(own.plan).scale if own else 1.0

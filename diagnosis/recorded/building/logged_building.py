@@ -22,6 +22,7 @@ from models.system import System
 BALANCE = "force_balance"  # signal of a building that is judged by the balance of its forces, N
 PER_PERIOD = 12  # averages in the shortest period, of which noise is told from the motion
 FEWEST = 50  # of averages at least, by which noise is known
+STEADY = 0.3  # of the noise of a force, by which its zero may be off and drift to either side, unseen
 BEFORE = 0.75  # share of what stated filters change, from which on they lie before the master
 SURE = 3.0  # standard deviations from which on a stated filter is taken to lie before the master
 
@@ -89,8 +90,16 @@ class LoggedBuilding(Building):
         self.present = of.present[:, : plan.storeys]
         self.about = 0.0 if of.linear else self._stated.late
         late = ALIKE if behind else max(ALIKE, UNLIKE * self.about) if self.about else LATE
-        rows = (("delay", late, self.about), ("gain", self._stated.calibration or CALIBRATED, 0.0))
-        logger = tuple(LoggedForce(name, by, None, self._force, at) for name, by, at in rows if self._force)
+        zero = STEADY * self._noise
+        rows = (
+            ("delay", late, self.about),
+            ("gain", self._stated.calibration or CALIBRATED, 0.0),
+            ("bias", zero, 0.0),
+            ("drift", 2.0 * zero / (len(of.motion) * self._interval), 0.0),
+        )
+        logger = tuple(
+            LoggedForce(name, by, None, self._force, at) for name, by, at in rows if self._force and by > 0.0
+        )
         self.nuisances = (*of.nuisances, *logger)
         self.alone, self.of_motion = False, 0.0
         whole = bool(of.present.all()) and len(self.measured) >= LEAST_TICKS
@@ -201,6 +210,8 @@ class LoggedBuilding(Building):
         """Position and force of the master's laboratory and the forces of the others, as the master used them."""
         position, force, used = self._inputs
         delay, gain = self.logger(system)
+        if made := system.effects.sensors.get(self._force):
+            force = force - made.bias - made.drift * self._interval * np.arange(force.size)
         rows = np.column_stack([force, used])
         late = [
             not self.behind or one.filter is not None or one.average > 0.0

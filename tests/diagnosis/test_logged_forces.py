@@ -1,0 +1,39 @@
+"""What a logger does to forces that a building used: delays before or behind its master, and zeros that drift."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.fits import fitting, residuals
+from diagnosis.fits.unexplained import leaves
+from diagnosis.recorded.building import logged_building
+from diagnosis.recorded.building.building import Building
+from diagnosis.recorded.building.logged_building import LoggedBuilding
+from tests.diagnosis.cases import Cases
+
+
+@pytest.mark.parametrize(("before", "late"), [(True, 8), (True, 1), (False, 8), (False, 1)], ids=str)
+def test_a_stated_delay_lies_before_the_master_or_behind_it(before: bool, late: int) -> None:
+    """What a balance leaves is the noise of the motion less that of the recorded force."""
+    rng = np.random.default_rng(late)
+    motion, force = rng.normal(size=(2, 20_000))
+    used = motion if before else force  # a master that read the force with this noise moved by it
+    plain = (motion - used)[:, None] + 0.1 * rng.normal(size=(motion.size, 1))
+    behind = plain + (np.roll(motion, late) - motion)[:, None]
+    assert logged_building.before_master(plain, behind) == before
+
+
+def test_a_zero_of_a_logged_force_may_be_off_and_drift_below_its_noise(cases: Cases) -> None:
+    whole = cases.record()
+    noise, share = whole.planned_noise["column_force"], np.linspace(0.0, 1.0, whole.ticks)
+    force = whole.signals["column_force"] + noise * (0.6 * share - 0.15)
+    drifting = replace(whole, signals=whole.signals | {"column_force": force})
+    data = residuals.prepare(LoggedBuilding(Building(drifting)), drifting)
+    fit = fitting.fit(data, {})
+    found = {one.parameter: float(z) for one, z in zip(data.part.nuisances, fit.z, strict=True)}
+    assert found["bias"] == pytest.approx(-0.5, abs=0.2)
+    assert found["drift"] == pytest.approx(1.0, abs=0.2)
+    assert not leaves(fit)
