@@ -177,8 +177,12 @@ class LoggedBuilding(Building):
 
     @property
     def passes(self) -> Array:
-        """Frequencies (storeys,) up to which the noise of forces passed, Hz: all filters where these are alike."""
-        several = self.channels if self.behind else (self._stated,)
+        """Frequencies (storeys,) up to which noise passed, Hz: that of forces, all filters where these are alike.
+
+        A motion whose numbers were logged more slowly than at every tick has none beyond half their rate.
+        """
+        motion = self.channels[: self.motion.shape[1]]
+        several = self.channels if self.behind else (self._stated, *motion)
         return np.full(len(self.signals), min(one.passes for one in several))
 
     @property
