@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from common.recording.imported import ImportedChannel
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.unexplained import leaves
 from diagnosis.recorded.building import logged_building
@@ -37,3 +38,12 @@ def test_a_zero_of_a_logged_force_may_be_off_and_drift_below_its_noise(cases: Ca
     assert found["bias"] == pytest.approx(-0.5, abs=0.2)
     assert found["drift"] == pytest.approx(1.0, abs=0.2)
     assert not leaves(fit)
+
+
+def test_numbers_that_were_logged_slowly_have_no_noise_beyond_half_their_rate(cases: Cases) -> None:
+    whole = cases.record()
+    building = Building(whole)
+    assert LoggedBuilding(building).passes == pytest.approx([np.inf])
+    slow = ImportedChannel(interpolated=True, rate=256.0)
+    building.channels = (slow, *building.channels[1:])
+    assert LoggedBuilding(building).passes == pytest.approx([128.0])

@@ -176,6 +176,16 @@ def test_a_logger_may_read_between_ticks_whatever_its_map_states(
     assert put_right(logged(cases.record(), stated, lambda x: shifted(passed(x), 0.6))).early == 0.0
 
 
+@pytest.mark.parametrize(("ticks", "found"), [(0.6, 2), (2.0, 0)])
+def test_behind_a_stated_delay_readings_may_be_later_by_an_interval(
+    ticks: float, found: int, cases: Cases
+) -> None:
+    whole = logged(cases.record(), {"delay": 0.016}, lambda x: shifted(x, 8.0))
+    forces = {name: shifted(whole.signals[name], ticks) for name in ("column_force", "damper_force")}
+    late = delays.delayed(replace(whole, signals=whole.signals | forces)).delayed
+    assert list(late.values()) == pytest.approx([ticks / RATE] * found, rel=0.2)
+
+
 def shifted(values: Array, ticks: float) -> Array:
     """Values that come so many ticks later."""
     places = np.arange(values.size, dtype=np.float64)

@@ -257,6 +257,8 @@ def test_effects_that_servo_hydraulics_cannot_have_are_refused(
     gradual = ActuatorEffects(velocity_limit=0.05, velocity_limit_sharpness=3.0)
     with pytest.raises(InputError, match=r"'actuator.velocity_limit' with law 1"):
         column_lab.build(DT, servo(), COLUMN, gradual)
+    with pytest.raises(InputError, match=r"'column.viscous' with a law but 0"):
+        column_lab.build(DT, servo(), COLUMN, None, ColumnEffects(viscous=1e4, viscous_law=1.0))
     with pytest.raises(InputError, match="above 0 kg"):
         column_lab.build(DT, servo(), Column())
 

@@ -119,3 +119,22 @@ def test_channels_that_are_alike_need_no_filter() -> None:
     motion, force = apart(one, NOTHING_STATED)
     assert (motion.filter, motion.delay) == (one.filter, one.delay)
     assert force == NOTHING_STATED
+
+
+@pytest.mark.parametrize(("model", "more", "keeps"), [("bouc_wen", YIELDS, True), ("linear", "", False)])
+def test_what_a_motion_does_at_its_turns_is_kept_by_a_memory_only(
+    model: str, more: str, keeps: bool, call: Any, tmp_path: Path
+) -> None:
+    t = np.arange(2000) / RATE
+    motion = 20.0 * np.sin(2.0 * np.pi * 1.3 * t)
+    np.savetxt(
+        tmp_path / "a.csv", np.column_stack([motion, 9.0 * motion]), "%.6f", ",", header="d,f", comments=""
+    )
+    (tmp_path / "plan.toml").write_text(PLAN.format(model=model, more=more))
+    (tmp_path / "map.toml").write_text(f'plan = "plan.toml"\nrate = {RATE}\n[signals]\n{ROWS % ("", "")}')
+    out = tmp_path / "a.mcap"
+    assert call("import", tmp_path / "a.csv", "--map", tmp_path / "map.toml", "-o", out) == 0
+    (part,) = parts_of(record.build(read_recording(out), role="master"))
+    bend = 20e-3 * (2.0 * np.pi * 1.3 / RATE) ** 2
+    expected = LAW["stiffness"] * 0.5 * bend / np.sqrt(80.0) if keeps else 0.0
+    assert np.max(part.blurred) == pytest.approx(expected, rel=0.05)

@@ -235,3 +235,12 @@ def test_rows_that_jitter_or_have_another_rate_are_no_ticks() -> None:
     assert clock_by_rows(times + jitter, INTERVAL) is None
     assert clock_by_rows(1.002 * times, INTERVAL) is None
     assert clock_by_rows(times[:30], INTERVAL) is None
+
+
+def test_a_row_just_before_a_tick_that_drifts_past_it_belongs_to_the_tick_before() -> None:
+    """Rows come 10 µs before their tick at first, which is half a hundredth of an interval, and 50 µs at the end."""
+    clock = ControllerClock(INTERVAL, 10e-6, 40e-6 / SECONDS)
+    times = INTERVAL * np.arange(round(SECONDS / INTERVAL), dtype=np.float64)
+    ticks = np.floor(clock.places(times))
+    when, values = clock.held(times, ticks, INTERVAL * np.arange(100, dtype=np.float64))
+    assert values == pytest.approx(when / INTERVAL)
