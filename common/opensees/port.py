@@ -25,6 +25,9 @@ LOOPBACK = "127.0.0.1"
 BYTES = 1 << 16  # read from a socket at once: 32 messages of the default size
 QUICKACK = getattr(socket, "TCP_QUICKACK", None)  # exists on Linux only
 LOOKS = 64  # reads from the present client, to see whether it has ended, before a second one is refused: 4 MB
+OTHERS = (
+    4  # messages in a row of a single client, after which others are looked for: it may never leave a pause
+)
 TOLD = 10  # refused clients that are reported by an event; more would fill the recording
 
 Say = Callable[[str], None]
@@ -215,6 +218,7 @@ class Ports:
         self.ports = ports
         self._eager = eager
         self._one = ports[0] if len(ports) == 1 else None
+        self._looks = 0  # in a row, at which a single client had sent something
         self._poll = select.poll()
         for port in ports:
             self._poll.register(port.listener, select.POLLIN)
@@ -231,17 +235,17 @@ class Ports:
         Raises:
             ClientError, RevisedError: as `ElementPort.read`.
         """
-        if self._one is not None and self._looked(self._one, self._eager if seconds > 0.0 else 0):
+        looked = self._one is not None and self._looked(self._one, self._eager if seconds > 0.0 else 0)
+        self._looks = self._looks + 1 if looked else 0
+        if looked and self._looks % OTHERS:
             return True
-        ready = self._ready(seconds)
-        if not ready:
-            return False
+        ready = self._ready(0.0 if looked else seconds)
         for port in self.ports:
             if port.client is not None and port.client.fileno() in ready:
                 port.read()  # a client that has ended makes room for the next one
             if port.listener.fileno() in ready:
                 port.accept()
-        return True
+        return looked or bool(ready)
 
     @staticmethod
     def _looked(port: ElementPort, eager: int) -> bool:

@@ -22,9 +22,10 @@ import numpy as np
 import pytest
 
 from common.opensees import wire
+from common.opensees.port import OTHERS, ElementPort, Ports
 from common.opensees.wire import ClientHeader, MessageCode, Sizes
 from tests.helpers import ROOT
-from tests.serve.client import FRESCO, HOST, PATIENCE_S, Element
+from tests.serve.client import FRESCO, HOST, PATIENCE_S, Element, free_port
 from tests.serve.serving import Served, Ticking, serve
 
 SAFE_S = 0.010
@@ -271,6 +272,25 @@ def test_a_flood_of_clients_is_turned_away_and_reported_at_most_ten_times(tmp_pa
     assert served.error is None
     assert served.client.error is None
     assert len(served.warned()) == 10
+
+
+def test_a_client_that_never_pauses_does_not_hide_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    said = list[str]()
+    port = ElementPort(f"{HOST}:{free_port()}", (1e6,), said.append)
+    ports = Ports([port])
+    with (
+        contextlib.closing(ports),
+        socket.create_connection(port.listener.getsockname()) as first,
+        socket.create_connection(port.listener.getsockname()) as second,
+    ):
+        assert ports.serve(PATIENCE_S)
+        assert port.peer == "{}:{}".format(*first.getsockname())
+        monkeypatch.setattr(port, "read", lambda: True)
+        for _ in range(2 * OTHERS):
+            assert ports.serve(0.0)
+        second.settimeout(PATIENCE_S)
+        assert second.recv(1) == b""
+    assert len(said) == 1
 
 
 @pytest.mark.parametrize(
