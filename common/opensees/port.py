@@ -25,9 +25,7 @@ LOOPBACK = "127.0.0.1"
 BYTES = 1 << 16  # read from a socket at once: 32 messages of the default size
 QUICKACK = getattr(socket, "TCP_QUICKACK", None)  # exists on Linux only
 LOOKS = 64  # reads from the present client, to see whether it has ended, before a second one is refused: 4 MB
-OTHERS = (
-    4  # messages in a row of a single client, after which others are looked for: it may never leave a pause
-)
+OTHERS = 4  # messages in a row of a single client, after which others are looked for as well
 TOLD = 10  # refused clients that are reported by an event; more would fill the recording
 
 Say = Callable[[str], None]
