@@ -176,18 +176,11 @@ def warnings(report: Report, most: int) -> list[str]:
 
     What a reader should do stands at the end of a warning.
     """
-    found = [row("warning", text, max(1, most)) for text in report.warnings]
-    shown = 0
-    while shown < len(found) and room(found, shown + 1) <= most:
-        shown += 1
-    shown = max(1, shown)
-    left = len(found) - shown
-    lines = [line for text in found[:shown] for line in text]
-    if left <= 0:
-        return lines
-    return [*lines[: max(1, most - 1)], " " * LABEL + f"{left} more in the report"]
-
-
-def room(found: Sequence[Sequence[str]], count: int) -> int:
-    """Lines that the first warnings take, with the one that counts the others."""
-    return sum(map(len, found[:count])) + (count < len(found))
+    lines, left = list[str](), len(report.warnings)
+    for text in report.warnings:
+        others = 1 if left > 1 else 0  # the line that counts them
+        whole = row("warning", text, max(1, most - others if not lines else MOST))
+        if lines and len(lines) + len(whole) + others > most:
+            break
+        lines, left = [*lines, *whole], left - 1
+    return [*lines, " " * LABEL + f"{left} more in the report"] if left else lines

@@ -112,6 +112,10 @@ def test_the_terminal_shows_as_many_warnings_as_go_whole_into_its_lines() -> Non
     assert len(many) <= 25
     assert re.fullmatch(r" +1\d more in the report", many[-1])
     assert not [line for line in many if line.endswith("…")]
+    cut = summary(dataclasses.replace(report, warnings=(long * 20, short, short))).split("\n")
+    assert len(cut) == 25
+    assert cut[-2].endswith("…")
+    assert cut[-1].strip() == "2 more in the report"
     assert "warning" not in summary(dataclasses.replace(report, warnings=()))
 
 
