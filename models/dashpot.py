@@ -13,8 +13,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from models.compiled import jit
 from models.registry import Array
 
@@ -30,10 +28,11 @@ def force(rate: float, coefficient: float, exponent: float) -> float:
     return math.copysign(size, rate)
 
 
-def forces(rate: Array, coefficient: float, exponent: float) -> Array:
-    """`force` at each of several rates (n,) m/s."""
-    size = coefficient * REFERENCE * (np.abs(rate) / REFERENCE) ** exponent
-    return np.asarray(np.copysign(size, rate))
+@jit
+def add_forces(rates: Array, coefficient: float, exponent: float, result: Array) -> None:
+    """Add `force` at each of several rates (n,) m/s to `result` (n,) N."""
+    for place in range(rates.size):
+        result[place] += force(rates[place], coefficient, exponent)
 
 
 @jit

@@ -205,7 +205,7 @@ def with_rates(
     velocity = np.gradient(displacement, interval)
     result: Array = force + damping * velocity + column.mass * np.gradient(velocity, interval)
     if power:
-        result += dashpot.forces(velocity, power, effects.viscous_exponent)
+        dashpot.add_forces(velocity, power, effects.viscous_exponent, result)
     return result
 
 
