@@ -58,7 +58,8 @@ class Contents:
         for _, channel in sorted(self._channels.items()):  # in the order in which they were registered
             if channel.topic.startswith("rths/"):
                 _take(run, channel, self._schemas, messages.get(channel.topic, []))
-        if _of_master_alone(run) and not any("slaves" in one.metadata for one in self._channels.values()):
+        named = any("slaves" in channel.metadata for channel in self._channels.values())
+        if not named and _of_master_alone(run):
             run.roles = ()
 
 
@@ -67,14 +68,9 @@ def _of_master_alone(run: Run) -> bool:
     if set(run.columns) != {MASTER}:
         return False
     try:
-        tables = tomllib.loads(run.metadata["plan"]["toml"])
-        return bool(tables["slave"]["kind"] == "none")
-    except (
-        KeyError,
-        TypeError,
-        tomllib.TOMLDecodeError,
-    ):  # whoever needs the plan says what is wrong with it
-        return False
+        return bool(tomllib.loads(run.metadata["plan"]["toml"])["slave"]["kind"] == "none")
+    except (KeyError, TypeError, tomllib.TOMLDecodeError):
+        return False  # whoever needs the plan says what is wrong with it
 
 
 def _check(run: Run) -> None:
