@@ -111,7 +111,7 @@ class ImportedChannel:
     known: bool = False  # whether it was given as a constant rather than measured
     first: float = 0.0  # s after the first tick, of the first of its samples that were interpolated
     average: float = 0.0  # s, up to which each of its samples is a mean
-    timed: bool = False  # whether its delay is stated, which may be none
+    delay_stated: bool = False  # whether its delay is, which may be none
 
     @property
     def between(self) -> bool:

@@ -319,7 +319,9 @@ def between_rows(lab: RecordedLaboratory, stated: Sequence[ImportedChannel]) -> 
 
 def nothing_stated(mapped: ImportedData | None, lab: RecordedLaboratory) -> bool:
     """Whether the import map states neither filter nor mean nor delay for any channel of a laboratory."""
-    return not any(one.filter or one.timed or one.delay or one.average for one in channels(mapped, lab))
+    return not any(
+        one.filter or one.delay_stated or one.delay or one.average for one in channels(mapped, lab)
+    )
 
 
 def calibrations(

@@ -176,7 +176,8 @@ class LaboratoryPart:
         sampled = [one.interpolated or one.rate * interval > OWN_RATE for one in self.channels]
         self.retimed = record.retimed or any(sampled)
         self.free = nothing_stated(record.mapped, lab)
-        self.timed = any(one.timed or one.delay or one.average for one in channels(record.mapped, lab))
+        mapped = channels(record.mapped, lab)
+        self.delay_stated = any(one.delay_stated or one.delay or one.average for one in mapped)
         self.built_in = lab.kind.name in KINDS  # a user's kind has steps of its own within an interval
         # an actuator that holds its command from the tick on needs no straight lines
         held = lab.kind.name == COLUMN and lab.plan.actuator.command == "held"

@@ -195,7 +195,7 @@ def shifted(values: Array, ticks: float) -> Array:
 def test_a_delay_that_is_stated_to_be_none_is_a_statement(cases: Cases) -> None:
     whole = cases.record()
     assert lab_b(logged(whole, {}, lambda x: x)).free
-    assert not lab_b(logged(whole, {"timed": True}, lambda x: x)).free
+    assert not lab_b(logged(whole, {"delay_stated": True}, lambda x: x)).free
 
 
 def test_rows_between_ticks_leave_open_when_a_tick_was(cases: Cases) -> None:

@@ -36,6 +36,13 @@ def test_units_give_the_scales_and_the_loggers_properties_are_kept(bring: Any) -
     assert not stated.interpolated
 
 
+def test_a_delay_of_none_is_stated_where_the_map_gives_it(bring: Any) -> None:
+    rows = DRIVE.replace("column_displacement = {", "column_displacement = { delay = 0.0,")
+    _, run = bring(table("t,u,y", TIMES, COMMAND, LATE), rows)
+    channels = [known(run).channel("master", name) for name in ("column_displacement", "actuator_command")]
+    assert [(one.delay, one.delay_stated) for one in channels] == [(0.0, True), (0.0, False)]
+
+
 def test_files_with_semicolons_decimal_commas_a_preamble_and_a_row_of_units_are_read(
     bring: Any, capsys: Any
 ) -> None:

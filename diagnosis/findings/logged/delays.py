@@ -29,7 +29,7 @@ def delayed(record: Record) -> Record:
     labs = [part for part in parts_of(record) if isinstance(part, LaboratoryPart)]
     if any(part.free for part in labs):
         return record
-    most = record.plan.test.interval if any(part.timed for part in labs) else math.inf
+    most = record.plan.test.interval if any(part.delay_stated for part in labs) else math.inf
     found: dict[tuple[str, str], float] = {}
     for force in (True, False):
         readings = of_laboratories(record, labs, force=force)

@@ -91,7 +91,9 @@ class SignalSource:
     scaled: bool = field(
         default=False, metadata=key("whether scale or unit is given", default=False).metadata
     )
-    timed: bool = field(default=False, metadata=key("whether a delay is given", default=False).metadata)
+    delay_stated: bool = field(
+        default=False, metadata=key("whether a delay is given", default=False).metadata
+    )
 
     @property
     def late(self) -> bool:
@@ -101,7 +103,7 @@ class SignalSource:
 
 APART = ("value", "filter", "resolution", "offset")  # keys that need their own check
 FORM = ("separator", "decimal", "skip_rows")  # keys of a text file, recognised where they are left out
-OUR_OWN = ("scaled", "timed")  # fields that are set here and cannot be given as keys
+OUR_OWN = ("scaled", "delay_stated")  # fields that are set here and cannot be given as keys
 
 
 @dataclass(frozen=True)
@@ -259,7 +261,7 @@ def source(path: Path, name: str, entry: Any, known: Known) -> SignalSource:
         filter=low_pass,
         value=None if value is None else float(value),
         scaled="unit" in values or "scale" in values,
-        timed="delay" in values,
+        delay_stated="delay" in values,
     )
 
 

@@ -357,5 +357,5 @@ def channel(
         rate=rate,
         first=first if between and not counted else 0.0,
         average=source.average,
-        timed=source.timed,
+        delay_stated=source.delay_stated,
     )
