@@ -17,7 +17,7 @@ from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import NoiseEntry, PartOfGap
-from diagnosis.signals.noise_model import NoiseModel
+from diagnosis.signals.noise.model import NoiseModel
 from models.registry import Array
 from models.system import System
 

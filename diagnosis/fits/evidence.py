@@ -17,8 +17,8 @@ import numpy as np
 
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Problem
-from diagnosis.signals import colour
-from diagnosis.signals.noise_model import NoiseModel
+from diagnosis.signals.noise import colour
+from diagnosis.signals.noise.model import NoiseModel
 
 OF_LINE = 3  # parameters of a narrow line: frequency, amplitude and phase
 

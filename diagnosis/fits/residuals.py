@@ -20,11 +20,11 @@ from diagnosis.recorded.building.logged_building import PER_PERIOD, LoggedBuildi
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, Part
 from diagnosis.recorded.record import Record
-from diagnosis.signals import colour
 from diagnosis.signals.mask import Mask
-from diagnosis.signals.noise_model import NoiseModel
+from diagnosis.signals.noise import colour
+from diagnosis.signals.noise.model import NoiseModel
+from diagnosis.signals.noise.spikes import deviation
 from diagnosis.signals.predictors.ceiling import Crosswise
-from diagnosis.signals.spikes import deviation
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect
 from models.registry import Array

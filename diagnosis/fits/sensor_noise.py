@@ -23,12 +23,12 @@ from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import LaboratoryPart, Part
-from diagnosis.signals import colour, pickup
 from diagnosis.signals.mask import Mask
-from diagnosis.signals.noise_model import NoiseModel, Source
+from diagnosis.signals.noise import colour, pickup
+from diagnosis.signals.noise.model import NoiseModel, Source
+from diagnosis.signals.noise.spikes import spikes
 from diagnosis.signals.predictors.ceiling import Crosswise
 from diagnosis.signals.predictors.features import features
-from diagnosis.signals.spikes import spikes
 from diagnosis.signals.systematic import samples_per_sample
 from models.registry import Array
 from models.system import System

@@ -15,7 +15,7 @@ from diagnosis.fits import fitting, hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.sensor_noise import Foreseen
 from diagnosis.recorded.building.logged_building import LoggedBuilding
-from diagnosis.signals.noise_model import NoiseModel
+from diagnosis.signals.noise.model import NoiseModel
 from diagnosis.signals.predictors.ceiling import Crosswise
 from diagnosis.signals.predictors.resonances import Resonances
 from models.registry import Array

@@ -12,7 +12,7 @@ from diagnosis.recorded.nuisances import channels, nuisances
 from diagnosis.recorded.parts import Measured, cut, of_sites, outputs
 from diagnosis.recorded.record import Record
 from diagnosis.recorded.smoothed import missed_at_turns, smoothed, without_small_turns
-from diagnosis.signals.noise import quantum
+from diagnosis.signals.noise.rounding import quantum
 from loop import replay
 from models.registry import Array
 from models.system import System

@@ -24,7 +24,7 @@ from diagnosis.recorded.commands import at_targets, completed, received
 from diagnosis.recorded.laboratory import RecordedLaboratory, recorded
 from diagnosis.signals import clock
 from diagnosis.signals.mask import Mask
-from diagnosis.signals.noise import quantum
+from diagnosis.signals.noise.rounding import quantum
 from laboratories import effects
 from laboratories.effects.effect import Effect
 from laboratories.effects.sites import BUILDING, LINK, sensors

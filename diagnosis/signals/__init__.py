@@ -1,1 +1,1 @@
-"""Signals and residuals by themselves, before any model: noise, quantum, windows, bands, ceilings."""
+"""Signals and residuals by themselves, before any model: noise, windows, bands, ceilings."""

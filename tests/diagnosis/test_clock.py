@@ -11,7 +11,7 @@ from diagnosis.diagnose import examine
 from diagnosis.findings.logged import logger
 from diagnosis.recorded.record import Record
 from diagnosis.signals import clock
-from diagnosis.signals.noise import quantum_between
+from diagnosis.signals.noise.rounding import quantum_between
 from models.registry import Array
 from tests.diagnosis.cases import Cases, imported
 

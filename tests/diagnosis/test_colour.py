@@ -10,11 +10,11 @@ from scipy import signal
 
 from diagnosis.fits import sensor_noise
 from diagnosis.fits.unexplained import gap
-from diagnosis.signals import colour, pickup
-from diagnosis.signals.noise_model import NoiseModel
+from diagnosis.signals.noise import colour, pickup
+from diagnosis.signals.noise.model import NoiseModel
+from diagnosis.signals.noise.spikes import spikes
 from diagnosis.signals.predictors.ceiling import Crosswise
 from diagnosis.signals.predictors.features import features
-from diagnosis.signals.spikes import spikes
 from models.registry import Array
 from tests.diagnosis.cases import white
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from common.errors import InputError
 from diagnosis.fits import residuals
-from diagnosis.signals.noise import quantum, quantum_between
+from diagnosis.signals.noise.rounding import quantum, quantum_between
 from models.registry import Array
 
 

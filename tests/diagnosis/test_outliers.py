@@ -14,7 +14,7 @@ from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
 from diagnosis.recorded.record import Record
-from diagnosis.signals.spikes import beyond, deviation, spikes
+from diagnosis.signals.noise.spikes import beyond, deviation, spikes
 from tests.diagnosis.cases import Cases, lab_b
 
 TICKS = (1200, 1900, 3100)  # of the samples that are read from elsewhere

@@ -11,8 +11,8 @@ from diagnosis.fits import candidates, contact, fitting, residuals, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.search import fewest, pruned
-from diagnosis.signals import colour
-from diagnosis.signals.noise_model import NoiseModel
+from diagnosis.signals.noise import colour
+from diagnosis.signals.noise.model import NoiseModel
 from models.registry import Array
 from tests.diagnosis.cases import STRONGEST, Cases, Effects, estimate, lab_b, named
 from tests.diagnosis.test_equivalents import DATA, NOISY

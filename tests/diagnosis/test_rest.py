@@ -11,8 +11,8 @@ from scipy import signal
 from diagnosis.fits import fitting, residuals, sensor_noise
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import LaboratoryPart
-from diagnosis.signals import colour
-from diagnosis.signals.noise_model import NoiseModel
+from diagnosis.signals.noise import colour
+from diagnosis.signals.noise.model import NoiseModel
 from tests.diagnosis.cases import Cases, lab_b
 
 SECONDS = 12.0  # of readings at rest

@@ -25,7 +25,7 @@ from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
 from diagnosis.recorded.record import Record
 from diagnosis.report.records import PartOfGap
-from diagnosis.signals.noise_model import Source
+from diagnosis.signals.noise.model import Source
 from models.registry import Array
 from report.gap import wording
 from tests.diagnosis.cases import STRONGEST, Cases, lab_a, lab_b, moved_by, unknown, white

@@ -20,7 +20,7 @@ from diagnosis.fits import hypothesis
 from diagnosis.fits.residuals import Data, filled
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.parts import LaboratoryPart
-from diagnosis.signals import colour
+from diagnosis.signals.noise import colour
 from models.registry import Array
 
 MOST = 40  # jumps: a zero that jumps more often is slow noise

@@ -21,7 +21,7 @@ from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.joined import laboratory_of
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.mask import Mask
-from diagnosis.signals.spikes import BEYOND, LONGEST, beyond, deviation, spikes
+from diagnosis.signals.noise.spikes import BEYOND, LONGEST, beyond, deviation, spikes
 from models.registry import Array
 
 # Power by which tails fall beyond `BEYOND` deviations where there are few spikes: that of Student's t with three

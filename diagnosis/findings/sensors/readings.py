@@ -12,7 +12,7 @@ from diagnosis.fits.residuals import STEPPING, Data
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.parts import FINE_ERROR
 from diagnosis.recorded.record import Record
-from diagnosis.signals.noise import quantum, quantum_between
+from diagnosis.signals.noise.rounding import quantum, quantum_between
 from models.registry import Array
 
 # A sensor counts as too noisy from LOUDER times the noise that the plan and the other sensors make expected, and from

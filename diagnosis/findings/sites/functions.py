@@ -20,7 +20,7 @@ from diagnosis.findings.sites.signatures import Signature, signatures
 from diagnosis.fits import hypothesis, sensor_noise
 from diagnosis.fits.fitting import Fit
 from diagnosis.recorded.parts import LaboratoryPart
-from diagnosis.signals import colour
+from diagnosis.signals.noise import colour
 from diagnosis.signals.predictors.ceiling import Crosswise
 from diagnosis.signals.predictors.features import aged, bent, lagged, mixed, plays, scaled, slow, standardised
 from diagnosis.signals.systematic import samples_per_sample

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from diagnosis.signals import colour
+from diagnosis.signals.noise import colour
 from diagnosis.signals.predictors.ceiling import FOLDS, folds
 from models.registry import Array
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from diagnosis.signals import colour
+from diagnosis.signals.noise import colour
 from models.registry import Array
 
 WAVES = 8.0  # half waves that a record must hold of a frequency to tell how loud its noise is
