@@ -16,7 +16,7 @@ from diagnosis.findings.further_tests import exercise, next_test
 from diagnosis.findings.timeless import without_times
 from diagnosis.findings.verdict import UNNAMED, PartVerdict
 from diagnosis.findings.which import which
-from diagnosis.fits import sensor_noise
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.settling import SMALL
 from diagnosis.recorded.nuisances import LoggedForce, LoggedReadings
 from diagnosis.recorded.record import Record

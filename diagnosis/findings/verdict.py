@@ -15,8 +15,9 @@ from diagnosis.findings.sensors.one_motion import one_motion
 from diagnosis.findings.sensors.own_reading import machine_alone, of_column
 from diagnosis.findings.sensors.slow_noise import under_less_noise
 from diagnosis.findings.sites.likely import APART, TRUE_LEAVES, likely_sites, ranked
-from diagnosis.fits import fitting, residuals, sensor_noise
+from diagnosis.fits import fitting, residuals
 from diagnosis.fits.fitting import Fit, at_end
+from diagnosis.fits.noise import inputs
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, exchanged_pair
 from diagnosis.fits.trade import tied
@@ -129,7 +130,7 @@ def seen_in(data: Data, verdict: PartVerdict) -> PartVerdict:
         residuals.measured_by(data, joined.data.white), noise=joined.data.noise, lines=lines, spikes=spikes
     )
     if here.noise:
-        here = replace(here, related=sensor_noise.related(here, here.system))
+        here = replace(here, related=inputs.related(here, here.system))
 
     def there(fit: Fit) -> Fit:
         return fitting.at(here, fit.values, fit.z)

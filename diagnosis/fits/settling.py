@@ -11,12 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.fits import candidates, evidence, fitting, sensor_noise
+from diagnosis.fits import candidates, evidence, fitting
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.noise import sensor_noise
+from diagnosis.fits.noise.sensor_noise import quieter
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.screening import ScreenedEffect
-from diagnosis.fits.sensor_noise import quieter
 from diagnosis.fits.threads import each
 from diagnosis.fits.unexplained import MATERIAL, exceeds, gaps, leaves, model_error
 from diagnosis.fits.worth import changes, idle, is_gap

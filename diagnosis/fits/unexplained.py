@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.fits import fitting, hypothesis, sensor_noise
+from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.sensor_noise import Foreseen
+from diagnosis.fits.noise import inputs, sensor_noise
+from diagnosis.fits.noise.sensor_noise import Foreseen
 from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.signals.noise.model import NoiseModel
 from diagnosis.signals.predictors.ceiling import Crosswise
@@ -125,10 +126,10 @@ def resonant(fit: Fit) -> Crosswise | None:
     if part.exact or isinstance(part, LoggedBuilding) or data.related is None:
         return None
     system = hypothesis.lay(data, fit.z, fit.values)
-    inputs = data.averaged(sensor_noise.inputs(part, system))
-    if data.related.count != len(inputs):
+    given = data.averaged(inputs.inputs(part, system))
+    if data.related.count != len(given):
         return None
-    resonances = Resonances(inputs, data.system.plan.test.interval * data.group)
+    resonances = Resonances(given, data.system.plan.test.interval * data.group)
     left = sensor_noise.remainder(data, system).noise / data.sigma
     related = data.related.beside(resonances.columns(left))
     beside = fitting.at(sensor_noise.modelled(replace(data, related=related), system), fit.values, fit.z)

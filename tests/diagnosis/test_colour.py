@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from diagnosis.fits import sensor_noise
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.unexplained import gap
 from diagnosis.signals.noise import colour, pickup
 from diagnosis.signals.noise.model import NoiseModel

@@ -10,8 +10,9 @@ from scipy import signal
 
 from diagnosis.findings.sensors.common_noise import in_common, unforeseen
 from diagnosis.findings.sites.likely import likely_sites
-from diagnosis.fits import fitting, residuals, sensor_noise, settling
+from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.recorded.record import Record
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_a, lab_b, white

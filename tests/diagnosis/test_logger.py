@@ -11,7 +11,8 @@ from scipy import signal
 from diagnosis.diagnose import examine
 from diagnosis.findings import report
 from diagnosis.findings.found import Diagnosis
-from diagnosis.fits import fitting, residuals, sensor_noise, settling
+from diagnosis.fits import fitting, residuals, settling
+from diagnosis.fits.noise import inputs, sensor_noise
 from diagnosis.recorded.divided import parts_of
 from diagnosis.recorded.ground import Ground
 from diagnosis.recorded.nuisances import LoggedReadings
@@ -166,8 +167,8 @@ def test_noise_that_a_controller_feeds_back_is_not_foreseen_by_commands(cases: C
     for record in (whole, alone):
         data = residuals.prepare(lab_a(record), record)
         noise = np.random.default_rng(3).standard_normal((data.groups, 2)) * data.sigma
-        data = replace(data, related=sensor_noise.related(data, data.system))
-        assert float(np.std(sensor_noise.predictable(data, noise) / data.sigma)) < 0.1
+        data = replace(data, related=inputs.related(data, data.system))
+        assert float(np.std(inputs.predictable(data, noise) / data.sigma)) < 0.1
 
 
 def test_the_error_of_an_interpolated_ground_motion_is_known(cases: Cases) -> None:

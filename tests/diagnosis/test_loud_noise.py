@@ -11,7 +11,8 @@ from diagnosis.diagnose import examine
 from diagnosis.findings import where
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.verdict import PartVerdict
-from diagnosis.fits import fitting, residuals, sensor_noise, settling
+from diagnosis.fits import fitting, residuals, settling
+from diagnosis.fits.noise import sensor_noise
 from tests.diagnosis.cases import Cases, lab_a, lab_b, moved_by, white
 
 STEP = 4e-5  # m, of the converter that gives a table its command

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.fits import candidates, contact, fitting, residuals, sensor_noise, settling, trade, worth
+from diagnosis.fits import candidates, contact, fitting, residuals, settling, trade, worth
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.search import fewest, pruned
 from diagnosis.signals.noise import colour
 from diagnosis.signals.noise.model import NoiseModel

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from diagnosis.fits import fitting, residuals, sensor_noise
+from diagnosis.fits import fitting, residuals
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.noise import colour

@@ -18,9 +18,10 @@ from diagnosis.findings.report import status_of
 from diagnosis.findings.sensors.own_reading import machine_alone
 from diagnosis.findings.sensors.slow_noise import lone_noise
 from diagnosis.findings.verdict import PartVerdict, allowed, artefact, judge, trifling
-from diagnosis.fits import fitting, residuals, sensor_noise, settling
+from diagnosis.fits import fitting, residuals, settling
 from diagnosis.fits.fitting import Fit, at_end, without_rest
 from diagnosis.fits.hypothesis import TOLERANCES, Values
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search, search
 from diagnosis.recorded.record import Record

@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 
 from common.plan.plan import Plan
-from diagnosis.fits import sensor_noise
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.residuals import Data
 from loop import replay
 from models.registry import Array

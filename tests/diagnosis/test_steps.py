@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from diagnosis.fits import evidence, fitting, residuals, sensor_noise
+from diagnosis.fits import evidence, fitting, residuals
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.residuals import COARSE, Data
 from diagnosis.recorded.parts import LaboratoryPart
 from models.registry import Array

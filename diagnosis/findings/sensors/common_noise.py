@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.fits import residuals, sensor_noise
+from diagnosis.fits import residuals
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.unexplained import SIGNIFICANT
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from diagnosis.findings.sensors.slow_noise import moves
 from diagnosis.findings.verdict import PartVerdict, judge
-from diagnosis.fits import candidates, fitting, residuals, sensor_noise
+from diagnosis.fits import candidates, fitting, residuals
 from diagnosis.fits.fitting import excess
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search

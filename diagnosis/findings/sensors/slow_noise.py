@@ -9,8 +9,9 @@ import numpy as np
 from diagnosis.findings.sensors.common_noise import in_common
 from diagnosis.findings.sensors.readings import LEAST
 from diagnosis.findings.sites.likely import APART, TRUE_LEAVES, ranked
-from diagnosis.fits import fitting, sensor_noise
+from diagnosis.fits import fitting
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search, likeliest
 from diagnosis.fits.threads import each

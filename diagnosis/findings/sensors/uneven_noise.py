@@ -19,8 +19,9 @@ import numpy as np
 from diagnosis.findings.certainty.other_causes import EITHER
 from diagnosis.findings.sites.signatures import alone
 from diagnosis.findings.verdict import OwnError, PartVerdict
-from diagnosis.fits import hypothesis, sensor_noise
+from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.noise import inputs, sensor_noise
 from diagnosis.fits.unexplained import BOTH
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.parts import LaboratoryPart
@@ -58,7 +59,7 @@ def uneven(fit: Fit) -> list[Uneven]:
     data = fit.data
     system = hypothesis.lay(data, fit.z, fit.values)
     single = sensor_noise.remainder(data, system).single
-    moving = sensor_noise.inputs(data.part, system)[: len(single)]
+    moving = inputs.inputs(data.part, system)[: len(single)]
     motions = [amplitudes(moving, size) for size in SCALES]
     said = np.nan_to_num(data.part.predict(system))[: len(single)]
     erring = BOTH * data.erring

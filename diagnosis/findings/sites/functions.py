@@ -17,8 +17,9 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from diagnosis.findings.sites.signatures import Signature, signatures
-from diagnosis.fits import hypothesis, sensor_noise
+from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.noise import inputs
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.noise import colour
 from diagnosis.signals.predictors.ceiling import Crosswise
@@ -41,7 +42,7 @@ def lead(fit: Fit, part: LaboratoryPart, sensor: str, machine: str) -> float:
     interval = data.system.plan.test.interval * data.group
     system = hypothesis.lay(data, fit.z, fit.values)
     frequencies: Array = np.asarray(np.fft.rfftfreq(2 * data.groups, interval), dtype=np.float64)
-    given = data.averaged(sensor_noise.dependencies(data.part, system))
+    given = data.averaged(inputs.dependencies(data.part, system))
     others = np.delete(given, given.shape[1] - len(part.signals) + place, axis=1)
     said = np.nan_to_num(data.part.predict(system))
     read = said + data.residual(system)

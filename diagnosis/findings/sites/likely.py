@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from diagnosis.findings.sensors.common_noise import in_common
 from diagnosis.findings.sites import functions
 from diagnosis.findings.sites.signatures import Signature, Spectrum, signatures
-from diagnosis.fits import fitting, hypothesis, sensor_noise
+from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import TOLERANCES
+from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.joined import laboratory_of
 from laboratories.effects.sites import is_sensor

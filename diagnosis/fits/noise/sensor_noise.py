@@ -18,17 +18,14 @@ import numpy as np
 
 from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.noise.inputs import inputs, predictable, related
 from diagnosis.fits.residuals import Data
-from diagnosis.recorded.building.logged_building import LoggedBuilding
-from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.noise import colour, pickup
 from diagnosis.signals.noise.model import NoiseModel, Source
 from diagnosis.signals.noise.spikes import spikes
-from diagnosis.signals.predictors.ceiling import Crosswise
-from diagnosis.signals.predictors.features import features
 from diagnosis.signals.systematic import samples_per_sample
 from models.registry import Array
 from models.system import System
@@ -41,7 +38,6 @@ SHARE = 0.35  # of the windows, the quietest, where fewer than `ENOUGH` seconds 
 SURE = 4.0  # standard errors beyond which noise follows the motion
 # Motion elsewhere over that of the quiet part, from which on noise that is as loud in both does not follow it.
 VARIED = 2.0
-LEAST = 4.0  # s of a recording without which no flexible model is asked
 # Times the density before the test, from which on slow noise in the test is another one: some seconds tell it to less.
 LOUDER = 4.0
 # Of the noise at the highest frequencies before a test, up to which it is that of the test: both are known to 3 %, and
@@ -148,23 +144,6 @@ def mains(fit: Fit) -> Array | None:
     return lines if lines.any() else None
 
 
-def related(data: Data, system: System) -> Crosswise | None:
-    """A flexible model of averaged residuals from the part's inputs, None where too little was recorded for one."""
-    columns = [data.averaged(values) for values in inputs(data.part, system).T]
-    interval = data.system.plan.test.interval * data.group
-    if not columns or data.groups * interval < LEAST:
-        return None
-    everywhere = np.ones(data.groups, dtype=bool)
-    return Crosswise(features(np.column_stack(columns), interval, everywhere, timeless=True))
-
-
-def predictable(data: Data, averaged: Array) -> Array:
-    """What of averaged residuals (groups, signals) follows from the part's inputs, stretch by stretch unseen."""
-    if data.related is None or data.related.count != len(averaged):
-        return np.zeros_like(averaged)
-    return data.related.predict(averaged / data.sigma) * data.sigma
-
-
 def coloured(data: Data) -> bool:
     """Whether the noise of any signal is not white."""
     return any(item.density is not None for item in data.noise)
@@ -252,30 +231,6 @@ def told(fit: Fit, said: Array) -> list[Foreseen]:
     sure = np.where(energy > 0.0, along / np.sqrt(np.maximum(energy, 1e-300)) / tails, 0.0)
     ratio = np.sqrt(np.maximum(2.0 * along - energy, 0.0) / (data.groups * data.group))
     return [Foreseen(float(r), float(z)) for r, z in zip(ratio, sure, strict=True)]
-
-
-def inputs(part: Part, system: System) -> Array:
-    """What a part's residuals may depend on, (ticks, inputs): its commands and its readings as predicted.
-
-    Targets stand in for the commands of transfer systems: these hold noise that a controller fed back. A
-    building's own motion stands in for what is predicted from the noise of the forces.
-    """
-    columns = dependencies(part, system)
-    return columns[:, np.ptp(columns, axis=0) > 0.0]
-
-
-def dependencies(part: Part, system: System) -> Array:
-    """The inputs with those that stand still."""
-    if isinstance(part, JoinedPart):
-        return np.concatenate([dependencies(piece, system) for piece in part.pieces])
-    if isinstance(part, LoggedBuilding):
-        return np.column_stack([part.ground, part.motion])
-    if isinstance(part, LaboratoryPart):
-        columns = list(part.wanted.values())
-        part = part.replaced(inputs=part.inputs | part.wanted)
-    else:
-        columns = [part.inputs] if isinstance(part, ColumnAlone) else []
-    return np.column_stack([*columns, *np.nan_to_num(part.predict(system)).T])
 
 
 class QuietPart(NamedTuple):
