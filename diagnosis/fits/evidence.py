@@ -29,8 +29,8 @@ def surprise(fit: Fit) -> float:
     volume = 2.0 * data.groups * float(np.sum(np.log(data.sigma)))
     if data.factors is not None:
         volume -= 2.0 * float(np.sum(np.log(data.factors)))
-    if data.resting is not None:
-        volume += 2.0 * float(np.sum(np.log(data.resting)))
+    for known in (data.resting, data.louder):
+        volume += 0.0 if known is None else 2.0 * float(np.sum(np.log(known)))
     models = data.noise or (None,) * data.sigma.size
     free = len(Problem(data, fit.values).frees) + sum(map(parameters, models))
     return float(np.sum(fit.reduced**2)) + volume + fit.prior + free * math.log(data.groups)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from common.errors import InputError
@@ -74,6 +75,7 @@ class Data:
     # (groups, signals) times the noise that an averaged sample behind an impact is known to; None where none is
     vague: Array | None = None
     resting: Array | None = None  # the same beside a coarse step on which a reading rests
+    loudness: Array | None = None  # (ticks, signals) of noise that grows with the reading, over its rms
     erring: float = MODEL_ERROR  # share of a reading's rms that a good solution of the model may err by
     static: bool = False  # whether its rows have no times
 
@@ -138,14 +140,17 @@ class Data:
         Its filter cuts off the noise that came through it, and what it left above tells nothing of that. So as many
         samples are averaged first as last half a wave of the highest frequency that it passed.
         """
-        half = 0.5 / (self.part.passes * self.system.plan.test.interval)
-        together = np.clip(np.ceil(half - ROUNDED), 1, max(1, len(residual) // SUMS)).astype(int)
-        result = np.empty(residual.shape[1])
+        together, result = self.together(len(residual)), np.empty(residual.shape[1])
         for size in np.unique(together):
             some = residual[: len(residual) // size * size, together == size]
             sums = some.reshape(-1, size, some.shape[1]).sum(axis=1) / math.sqrt(size)
             result[together == size] = noise(sums)
         return result
+
+    def together(self, ticks: int) -> NDArray[np.int64]:
+        """How many of so many ticks (signals,) to add up so that all frequencies left have passed a logger."""
+        half = 0.5 / (self.part.passes * self.system.plan.test.interval)
+        return np.clip(np.ceil(half - ROUNDED), 1, max(1, ticks // SUMS)).astype(np.int64)
 
     @cached_property
     def there(self) -> Mask:
@@ -233,10 +238,17 @@ class Data:
         held = self.whitened(raw)[self.judging]
         return float(np.mean(np.square(held))) * self.groups * self.sigma.size
 
+    @cached_property
+    def louder(self) -> Array | None:
+        """Rms noise (groups, signals) of averaged samples over that of the record, where any grows with its reading."""
+        if self.loudness is None:
+            return None
+        return np.asarray(np.sqrt(self.averaged(self.loudness**2) / math.sqrt(self.group)))
+
     def whitened(self, raw: Array) -> Array:
         """Residuals in σ (ticks, signals) averaged over groups and whitened, (groups, signals); `raw` may change."""
         result = self.coloured(raw)
-        for known in (self.vague, self.resting):
+        for known in (self.vague, self.resting, self.louder):
             result = result if known is None else result / known[: len(result)]
         return result
 

@@ -14,6 +14,7 @@ import numpy as np
 from diagnosis.fits import fitting, hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.noise import inputs, sensor_noise
+from diagnosis.fits.noise.remainder import remainder
 from diagnosis.fits.noise.sensor_noise import Foreseen
 from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.signals.noise.model import NoiseModel
@@ -130,7 +131,7 @@ def resonant(fit: Fit) -> Crosswise | None:
     if data.related.count != len(given):
         return None
     resonances = Resonances(given, data.system.plan.test.interval * data.group)
-    left = sensor_noise.remainder(data, system).noise / data.sigma
+    left = remainder(data, system).noise / data.sigma
     related = data.related.beside(resonances.columns(left))
     beside = fitting.at(sensor_noise.modelled(replace(data, related=related), system), fit.values, fit.z)
     found = sensor_noise.told(beside, resonances.predict(beside.reduced))

@@ -21,7 +21,9 @@ from diagnosis.findings.sites.signatures import alone
 from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.noise import inputs, sensor_noise
+from diagnosis.fits.noise import inputs
+from diagnosis.fits.noise.growing_noise import evened
+from diagnosis.fits.noise.remainder import remainder
 from diagnosis.fits.unexplained import BOTH
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.parts import LaboratoryPart
@@ -56,9 +58,9 @@ STEADY = Uneven(0.0, 0.0, 0)
 
 def uneven(fit: Fit) -> list[Uneven]:
     """How much of the noise of every reading follows the motion, beside what a model may err by."""
-    data = fit.data
-    system = hypothesis.lay(data, fit.z, fit.values)
-    single = sensor_noise.remainder(data, system).single
+    system = hypothesis.lay(fit.data, fit.z, fit.values)
+    data, rest = evened(fit.data, remainder(fit.data, system), system)
+    single = rest.single
     moving = inputs.inputs(data.part, system)[: len(single)]
     motions = [amplitudes(moving, size) for size in SCALES]
     said = np.nan_to_num(data.part.predict(system))[: len(single)]
@@ -111,9 +113,7 @@ def differences(values: Array, size: int) -> Array:
 
 def amplitudes(moving: Array, size: int) -> Array:
     """Rms (differences, columns) of each input, of its slope and of its bend, of those that change."""
-    begun = moving - moving[0]
-    slope = np.gradient(begun, axis=0)
-    columns = np.square(np.concatenate([begun, slope, np.gradient(slope, axis=0)], axis=1))
+    columns = np.square(inputs.motions(moving))
     count = len(columns) // (2 * size)
     rms = np.sqrt(columns[: 2 * size * count].reshape(count, 2 * size, -1).mean(axis=1))
     return np.asarray(rms[:, np.ptp(rms, axis=0) > 0.0])
@@ -158,6 +158,24 @@ def standard(values: Array) -> Array:
     """Values (n, …) with mean zero and rms one along the first axis; zero where they do not change."""
     apart = values - values.mean(axis=0)
     return np.asarray(apart / np.maximum(apart.std(axis=0), 1e-300))
+
+
+def growing(verdicts: Sequence[PartVerdict]) -> list[str]:
+    """A sentence for each reading whose noise grows with it, which counts as no gap."""
+    sentences = []
+    for verdict in verdicts:
+        fit = verdict.search.chosen
+        system = hypothesis.lay(fit.data, fit.z, fit.values)
+        data = evened(fit.data, remainder(fit.data, system), system)[0]
+        if data.loudness is not None:
+            times = data.loudness.max(axis=0) / data.loudness.min(axis=0)
+            sentences += [
+                f"The noise of {signal} grows with its reading, to {much:.2g} times as much at the largest, and counts "
+                "as no gap."
+                for signal, much in zip(data.part.signals, times, strict=True)
+                if much > 1.0
+            ]
+    return sentences
 
 
 def following(verdict: PartVerdict) -> dict[str, Uneven]:

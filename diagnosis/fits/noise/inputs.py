@@ -41,6 +41,13 @@ def dependencies(part: Part, system: System) -> Array:
     return np.column_stack([*columns, *np.nan_to_num(part.predict(system)).T])
 
 
+def motions(moving: Array) -> Array:
+    """Inputs (ticks, inputs) from where they begin, with their slopes and bends beside them, (ticks, 3·inputs)."""
+    begun = moving - moving[0]
+    slope = np.gradient(begun, axis=0)
+    return np.asarray(np.concatenate([begun, slope, np.gradient(slope, axis=0)], axis=1))
+
+
 def related(data: Data, system: System) -> Crosswise | None:
     """A flexible model of averaged residuals from the part's inputs, None where too little was recorded for one."""
     columns = [data.averaged(values) for values in inputs(data.part, system).T]

@@ -9,7 +9,6 @@ slowly from row to row is the error of a law along the path, unless rows at rest
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import replace
 from typing import NamedTuple
@@ -18,14 +17,14 @@ import numpy as np
 
 from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.noise.inputs import inputs, predictable, related
+from diagnosis.fits.noise.growing_noise import evened
+from diagnosis.fits.noise.inputs import inputs, related
+from diagnosis.fits.noise.remainder import Remainder, remainder, spans
 from diagnosis.fits.residuals import Data
-from diagnosis.recorded.joined import JoinedPart
-from diagnosis.recorded.parts import LaboratoryPart, Part
+from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.noise import colour, pickup
 from diagnosis.signals.noise.model import NoiseModel, Source
-from diagnosis.signals.noise.spikes import spikes
 from diagnosis.signals.systematic import samples_per_sample
 from models.registry import Array
 from models.system import System
@@ -46,16 +45,6 @@ AS_LOUD = 1.08
 LOWER = 0.9  # of the noise first found, from which on a lower one is believed
 
 
-class Remainder(NamedTuple):
-    """What of a part's residuals no model of the part could explain."""
-
-    noise: Array  # (groups, signals) averaged, in the signals' units
-    single: Array  # (groups·group, signals) sample by sample
-    lines: Array  # (ticks, signals)
-    found: tuple[tuple[pickup.Pickup, ...], ...]  # by signal
-    spikes: Mask  # (ticks, signals)
-
-
 def quieter(after: Data, before: Data) -> bool:
     """Whether the noise of any signal is lower than it was."""
     return bool(np.any(after.white < LOWER * before.white))
@@ -73,63 +62,13 @@ def modelled(data: Data, system: System) -> Data:
     """The data with noise as a hypothesis leaves it."""
     if data.related is None:
         data = replace(data, related=related(data, system))
-    rest = remainder(data, system)
+    data, rest = evened(data, remainder(data, system), system)
     quiet = quiet_part(data, system)
     models = tuple(model(data, rest, quiet, place) for place in range(len(data.part.signals)))
     white = np.array([item.rms for item in models])
     lines = rest.lines if rest.lines.any() else None
     spiky = rest.spikes if rest.spikes.any() else None
     return residuals.measured_by(replace(data, noise=models, lines=lines, spikes=spiky), white)
-
-
-def remainder(data: Data, system: System) -> Remainder:
-    """Lines, spikes and what inputs predict taken away from the residuals of a hypothesis.
-
-    Lines that something moving makes are no noise, but no pickup either: a hypothesis has to explain them.
-    """
-    part, interval = data.part, data.system.plan.test.interval
-    raw = part.measured - part.predict(system)
-    there = part.present & np.isfinite(raw)
-    spiky, lines = np.zeros_like(there), np.zeros_like(raw)
-    found: list[tuple[pickup.Pickup, ...]] = [()] * raw.shape[1]
-    for place in range(raw.shape[1]):
-        if there[:, place].mean() < 0.5:
-            raw[:, place] = 0.0
-            continue
-        whole = residuals.filled(raw[:, place], there[:, place])
-        spiky[:, place] = spikes(whole) & there[:, place]
-        raw[:, place] = residuals.filled(whole, ~spiky[:, place])
-    for number, span in enumerate([] if data.static else spans(part)):  # rows have no frequencies
-        lines[span], picked, kept = picked_up(raw[span], interval)
-        raw[span] -= lines[span] + kept
-        found = picked if number == 0 else found
-    averaged = data.averaged(raw)
-    said = predictable(data, averaged)
-    single = raw[: data.groups * data.group] - np.repeat(said, data.group, axis=0) / math.sqrt(data.group)
-    return Remainder(averaged - said, single, lines, tuple(found), spiky)
-
-
-def spans(part: Part) -> list[slice]:
-    """The ticks of each recording of a part: a line's phase is that of one recording."""
-    if not isinstance(part, JoinedPart):
-        return [slice(None)]
-    ends = np.cumsum([0, *(len(piece.measured) for piece in part.pieces)])
-    return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
-
-
-def picked_up(raw: Array, interval: float) -> tuple[Array, list[tuple[pickup.Pickup, ...]], Array]:
-    """Waves (ticks, signals) that sensors pick up of residuals of that shape, their lines, and waves that move."""
-    found = [pickup.pickups(one, interval, pickup.SLOWEST) for one in raw.T]
-    moving = pickup.moving(found, raw, interval)
-    picked = [
-        tuple(one for one in lines if one not in own and one.frequency > pickup.LOWEST)
-        for lines, own in zip(found, moving, strict=True)
-    ]
-    waves, kept = (
-        np.column_stack([pickup.waves(x, lines, interval) for x, lines in zip(raw.T, those, strict=True)])
-        for those in (picked, moving)
-    )
-    return waves, picked, kept
 
 
 def mains(fit: Fit) -> Array | None:
