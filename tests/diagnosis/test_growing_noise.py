@@ -32,7 +32,7 @@ def reading() -> Array:
 
 
 def loudness(size: Array) -> Array:
-    """A level that is `LARGEST` times as high where a size is largest as where it is zero, with a mean square of one."""
+    """A level that is `LARGEST` times as high where a size is largest as at rest, with a mean square of one."""
     level = 1.0 + (LARGEST - 1.0) * np.abs(size) / np.max(np.abs(size))
     return np.asarray(level / np.sqrt(np.mean(level**2)))
 
