@@ -182,12 +182,16 @@ def under_others(fit: Fit) -> list[Fit]:
 
 
 def of_the_plan(bare: Fit, fit: Fit, first: Sequence[Fit]) -> list[Fit]:
-    """Fits with two other values of the plan in the place of one law that moves as many parameters or more.
+    """Fits with two other values of the plan in the place of effects of one site that move as many parameters or more.
 
-    A table that is both late and slow looks like one whose oil gives way. One of the two by itself explains much then.
-    `first` are the fits with one effect; each of two begins at half of what it is alone.
+    A table that is both late and slow looks like one whose oil gives way, or one with a feed-forward and a little play.
+    One of the two by itself explains much then. `first` are the fits with one effect; each of two begins at half of
+    what it is alone.
     """
-    if len(fit.names) != 1 or freedom(fit)[0] < 2 or leaves(fit):
+    sites = {fit.data.catalogue[name].site for name in fit.names}
+    if len(sites) != 1 or freedom(fit)[0] < 2 or leaves(fit):
+        return []
+    if set(fit.names) <= set(values_of_plan(fit.data, fit.values)):
         return []
     plain = [item for item in first if freedom(item)[0] == 1 and values_of_plan(item.data, item.values)]
     if all(excess(item) > FOLLOWED * excess(bare) for item in plain):
