@@ -224,17 +224,17 @@ def polished(found: Fit) -> Fit:
 def at_end(fit: Fit) -> tuple[str, ...]:
     """Effects of a fit of which a parameter that is no shape lies at the end of what is believed of it.
 
-    Friction that hardly rests counts as well.
+    So do those of which a defining shape is least, and friction that hardly rests.
     """
     problem = Problem(fit.data, fit.values)
     low, high = problem.bounds()
     places = problem.place(fit.values, fit.z)
     edge = END * (high - low)
-    far = (places <= low + edge) | (places >= high - edge)
+    least, most = places <= low + edge, places >= high - edge
     ended = [
         item.effect
-        for item, yes in zip(problem.frees, far[fit.z.size :], strict=True)
-        if yes and not item.parameter.shape
+        for item, below, above in zip(problem.frees, least[fit.z.size :], most[fit.z.size :], strict=True)
+        if ((below or above) and not item.parameter.shape) or (below and item.parameter.defining)
     ]
     return (*ended, *without_rest(fit))
 

@@ -342,18 +342,25 @@ def in_front(search: Search, stands: Fit) -> Search:
 def plainest(search: Search) -> Search:
     """The search with that one in front of as many effects that the data cannot tell from the chosen ones.
 
-    Those that move nominal parameters further than chance does stand behind the others. A machine's effect stands
-    before a sensor's, then the one with the fewest free parameters, then other values of the plan before laws, then the
+    Those that move nominal parameters further than chance does stand behind the others, and effects at the end of their
+    range behind effects inside it. A machine's effect stands before a sensor's, then the one with the fewest free parameters, then other values of the plan before laws, then the
     likeliest, where one of several laws is as likely as any other of its effect.
     """
     catalogue, chosen = search.data.catalogue, search.chosen
 
-    def order(fit: Fit) -> tuple[bool, int, int, int, float]:
+    def order(fit: Fit) -> tuple[bool, bool, int, int, int, float]:
         artefacts = sum(catalogue[name].kind == "measurement" for name in fit.names)
         laws = sum(math.log(max(1, len(catalogue[name].laws))) for name in fit.names)
         beyond = len(fit.names) - len(hypothesis.values_of_plan(fit.data, fit.values))
         pulled = fit.prior > least + trade.PULLED
-        return pulled, artefacts, trade.freedom(fit)[0], beyond, fit.cost + 2.0 * laws
+        return (
+            pulled,
+            bool(fitting.at_end(fit)),
+            artefacts,
+            trade.freedom(fit)[0],
+            beyond,
+            fit.cost + 2.0 * laws,
+        )
 
     same = [item for item in search.alternatives if len(item.names) == len(chosen.names)]
     level = [item for item in same if tied(chosen, item) or plainer(item, chosen)]

@@ -37,6 +37,9 @@ class Parameter:
     swallows: bool = (
         False  # whether it is a width of a motion that comes to nothing: a search goes up to what is reached
     )
+    defining: bool = (
+        False  # whether its effect is another one where it is least: yielding without a loop is elastic
+    )
     smoothing: float = (
         0.0  # for a velocity that smooths a law near rest: its share of the peak velocity in a search
     )

@@ -47,6 +47,7 @@ EFFECT = sets(
             sizes=(0.3, 0.6, 0.9),
             says="height of the loop over the force at the bend",
             shape=True,
+            defining=True,
         ),
     },
     says="the specimen centres itself: its loop closes before the origin",

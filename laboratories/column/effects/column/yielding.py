@@ -252,6 +252,7 @@ EFFECT = sets(
             sizes=(),
             says="width of the loop of laws 12 and 13: 0.5 unloads with the elastic stiffness, 1 with up to twice it",
             shape=True,
+            defining=True,
         ),
         "strength_loss": of_law(
             13, "strength_loss", 0.0, 0.0, 10.0, "δ_ν, loss of strength per dissipated energy over k·δ_y²"
