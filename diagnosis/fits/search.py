@@ -343,8 +343,9 @@ def plainest(search: Search) -> Search:
     """The search with that one in front of as many effects that the data cannot tell from the chosen ones.
 
     Those that move nominal parameters further than chance does stand behind the others, and effects at the end of their
-    range behind effects inside it. A machine's effect stands before a sensor's, then the one with the fewest free parameters, then other values of the plan before laws, then the
-    likeliest, where one of several laws is as likely as any other of its effect.
+    range behind effects inside it. A machine's effect stands before a sensor's, then the one with the fewest free
+    parameters, then other values of the plan before laws, then the likeliest, where one of several laws is as likely as
+    any other of its effect.
     """
     catalogue, chosen = search.data.catalogue, search.chosen
 

@@ -68,7 +68,7 @@ def other_causes(search: Search) -> Iterator[str]:
         )
     if loop := loop_of_several(search):
         yield (
-            f"Several values of the plan are named of the {loop}. One other part of its loop, such as a filter in its "
+            f"Several effects of the {loop} are named. One other part of its loop, such as a filter in its "
             "feedback, may look the same: these signals cannot tell them apart."
         )
     if specimen := specimen_of_several(search):
@@ -138,17 +138,16 @@ def told_by_little(fit: Fit) -> str:
 
 
 def loop_of_several(search: Search) -> str:
-    """The transfer system of which several values of the plan are named, empty for none.
+    """The transfer system of which several effects are named, empty for none.
 
     Its loop has more parts than the plan has values of it: a filter in its feedback looks like a shorter time constant
-    with a longer delay, and leaves nothing to be seen.
+    with a longer delay, and leaves nothing to be seen. So does what the formula of one effect leaves of another one.
     """
     data, part = search.data, laboratory_of(search.data.part)
     if part is None:
         return ""
     loop = part.lab.site(part.lab.kind.sites[0])
-    values = hypothesis.values_of_plan(data, search.chosen.values)
-    return loop if sum(data.catalogue[name].site == loop for name in values) > 1 else ""
+    return loop if sum(data.catalogue[name].site == loop for name in search.chosen.names) > 1 else ""
 
 
 def specimen_of_several(search: Search) -> str:
