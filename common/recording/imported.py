@@ -38,6 +38,7 @@ REST = "at_rest"  # attachment of readings from before the test
 FILTERS = ("butterworth", "bessel", "chebyshev", "elliptic")
 RIPPLING = FILTERS[2:]
 HALF_POWER = 0.443  # at which frequency a mean over time loses 3 dB, times that time
+ON_TICK = 1e-3  # of an interval, by which a row may come before the tick that it shows
 TINY = 1e-12  # Hz, in place of no frequency, at which a high-pass lets nothing pass
 NODES = (-2, -1, 0, 1)  # ticks of the samples around one, through which a cubic goes
 Samples = NDArray[np.float64]
@@ -122,6 +123,11 @@ class ImportedChannel:
         """When the samples that were interpolated at `ticks` were taken, in ticks."""
         count = int((ticks - 1 - self.first / interval) * interval * self.rate) + 1
         return np.asarray((self.first + np.arange(count) / self.rate) / interval)
+
+    def seen(self, ticks: int, interval: float) -> NDArray[np.int64]:
+        """The ticks of `ticks` whose numbers the rows showed, each the last one before a row."""
+        last = np.floor(self.samples(ticks, interval) + ON_TICK).astype(np.int64)
+        return np.unique(last[last >= 0])
 
     @property
     def passes(self) -> float:

@@ -6,13 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
-from common.recording.imported import ImportedChannel
+from common.recording.imported import IMPORT, ImportedChannel, ImportedData
+from common.roles import MASTER
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.unexplained import leaves
 from diagnosis.recorded.building import logged_building
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import LoggedBuilding
+from diagnosis.recorded.record import Record
+from models.registry import Array
 from tests.diagnosis.cases import Cases
 
 
@@ -47,3 +51,37 @@ def test_numbers_that_were_logged_slowly_have_no_noise_beyond_half_their_rate(ca
     slow = ImportedChannel(interpolated=True, rate=256.0)
     building.channels = (slow, *building.channels[1:])
     assert LoggedBuilding(building).passes == pytest.approx([128.0])
+
+
+def with_ground(whole: Record, ground: Array, rate: float) -> Record:
+    """The record as imported, with a ground motion (ticks,) that a logger read at a rate (Hz)."""
+    channel = ImportedChannel(interpolated=True, rate=rate)
+    stated = ImportedData("", channels={MASTER: {"ground_acceleration": channel}})
+    run = replace(whole.run, metadata=whole.run.metadata | {IMPORT: stated.metadata()})
+    return replace(whole, run=run, signals=whole.signals | {"ground_acceleration": ground})
+
+
+@pytest.mark.parametrize("followed", [True, False])
+def test_a_ground_motion_between_the_ticks_of_a_slow_logger_is_as_the_motion_is_there(
+    followed: bool, cases: Cases
+) -> None:
+    """The balance of a building holds of numbers that one spline has, and of none that an import followed."""
+    whole, rate = cases.record(), 256.0
+    channel = ImportedChannel(interpolated=True, rate=rate)
+    seen = channel.seen(whole.ticks, 2e-3)
+    assert np.all(seen == np.unique(np.floor(np.arange(seen.size) / rate / 2e-3 + 1e-9)))
+
+    def between(values: Array) -> Array:
+        return np.asarray(CubicSpline(seen, values[seen])(np.arange(whole.ticks)))
+
+    ground = whole.signals["ground_acceleration"]
+    read = ground if followed else between(ground)
+    here = Building(with_ground(whole, read, rate)).ground
+    assert here == pytest.approx(between(ground), abs=1e-6 * float(np.std(ground)))
+    assert np.std(here - ground) > 1e-4 * np.std(ground)
+
+
+def test_a_ground_motion_that_a_logger_read_at_every_tick_stays(cases: Cases) -> None:
+    whole = cases.record()
+    ground = whole.signals["ground_acceleration"]
+    assert np.all(Building(with_ground(whole, ground, 500.0)).ground == ground)

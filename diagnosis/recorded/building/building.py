@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from common.recording.imported import ImportedData
 from common.roles import MASTER
@@ -17,6 +18,11 @@ from models.registry import Array
 from models.system import System
 
 MOTION = ("displacement", "velocity", "acceleration")
+GROUND = "ground_acceleration"
+SLOWER = 0.9  # rows in an interval, below which they pass over so many ticks that these count
+FEWEST = 4  # ticks that a spline needs
+# Share of the ticks between at which an import that follows the ground motion is nearer to it than that share of it.
+FOLLOWED, NEAR = 0.8, 1e-4
 
 
 def differences(displacement: Array, interval: float) -> dict[str, Array]:
@@ -31,6 +37,27 @@ def differences(displacement: Array, interval: float) -> dict[str, Array]:
         "velocity": velocity,
         "acceleration": np.pad(bends, ((1, 1), (0, 0)), mode="edge"),
     }
+
+
+def ground_as_motion(record: Record) -> Array:
+    """The recorded ground acceleration (ticks,), between the ticks that rows showed as the motion is there.
+
+    An import follows the plan's ground motion between these, and has all other numbers of the master by a cubic spline.
+    Equations of motion hold of what they all are by one.
+    """
+    values, stated = record.signals[GROUND], record.stated
+    channel = stated.channel(MASTER, GROUND) if stated is not None else None
+    interval = record.plan.test.interval
+    if channel is None or record.ground is None or not channel.interpolated:
+        return values
+    if not 0.0 < channel.rate * interval < SLOWER:
+        return values
+    seen = channel.seen(record.ticks, interval)
+    between = np.setdiff1d(np.arange(record.ticks), seen)
+    off = np.abs(values - record.ground[0, : values.size])[between]
+    if seen.size < FEWEST or np.mean(off < NEAR * np.std(values)) < FOLLOWED:
+        return values
+    return np.asarray(CubicSpline(seen, values[seen])(np.arange(record.ticks)))
 
 
 class Building(Measured):
@@ -64,9 +91,8 @@ class Building(Measured):
         self._scale = own.kind.coupling(own.plan).scale if own else 1.0
         self._interval = record.plan.test.interval
         self._recorded = tuple(name for name in MOTION if record.has(name))
-        here = record.signals["ground_acceleration"]
         self._ground = np.zeros((2, record.ticks + 1))
-        self._ground[0, :-1] = here
+        self._ground[0, :-1] = ground_as_motion(record)
         storeys = plan.storeys
         self.signals = tuple(name for name in self._recorded for _ in range(storeys))
         rows = {name: record.signals[name].reshape(record.ticks, -1) for name in self._recorded}
@@ -76,7 +102,7 @@ class Building(Measured):
         self.motion = np.hstack([rows.get(name, by_differences[name]) for name in MOTION])
         stated = record.stated or ImportedData("")
         known = [name if name in rows else "displacement" for name in MOTION for _ in range(storeys)]
-        seen = (*known, "ground_acceleration", self._force, *came)  # motion, ground and forces
+        seen = (*known, GROUND, self._force, *came)  # motion, ground and forces
         self.channels = tuple(stated.channel(MASTER, name) for name in seen)
         self._stated = stated.channel(MASTER, self._force)
         self.nuisances = of_building(plan)
