@@ -64,6 +64,16 @@ def test_several_values_of_one_loop_may_be_one_other_part_of_it(cases: Cases) ->
     assert loop_of_several(replace(found, chosen=alone)) == ""
 
 
+def test_laws_of_one_loop_may_be_one_other_part_of_it_as_well(cases: Cases) -> None:
+    data = residuals.prepare(lab_b(whole := cases.record()), whole)
+    bare = fitting.at(data, {}, np.zeros(len(data.part.nuisances)))
+    backlash = data.catalogue["table.backlash"].values({"width": 1e-4})
+    values = {"table.backlash": backlash, "table.delay": {"delay": 0.004}}
+    assert loop_of_several(Search(data, bare, fitting.at(data, values, bare.z), ())) == "table"
+    one = fitting.at(data, {"table.backlash": backlash}, bare.z)
+    assert loop_of_several(Search(data, bare, one, ())) == ""
+
+
 def test_several_values_of_a_damper_are_parts_of_their_own(cases: Cases) -> None:
     data = residuals.prepare(lab_b(whole := cases.record()), whole)
     bare = fitting.at(data, {}, np.zeros(len(data.part.nuisances)))

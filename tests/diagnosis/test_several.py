@@ -14,7 +14,7 @@ from diagnosis.fits.hypothesis import Values
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import may_lack, needed, with_weaker
 from models.registry import Array
-from tests.diagnosis.cases import Cases, Effects, lab_a
+from tests.diagnosis.cases import Cases, Effects, lab_a, lab_b
 from tests.diagnosis.test_equivalents import DATA, NOISY
 
 # three of them leave little, with the nominal stiffness at the end of its range
@@ -143,3 +143,26 @@ def test_an_effect_without_which_nothing_is_left_either_is_not_needed(cases: Cas
     data = residuals.prepare(lab_a(whole := cases.record(late, duration=8.0)), whole)
     both = fitting.fit(data, late | {"sensor.column_force.gain": {"factor": 1.001}})
     assert needed(both, worth.SEEN).names == ("actuator.delay",)
+
+
+@pytest.mark.long
+def test_a_table_that_is_late_and_slow_is_both_and_no_feed_forward_with_play(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    true = {"table.bandwidth": {"factor": 0.5}, "table.delay": {"delay": 0.005}}
+    whole = cases.record(true, duration=8.0)
+    data = residuals.prepare(lab_b(whole), whole)
+    bare = fitting.fit(data, {})
+    first = [fitting.fit(data, {name: values}, bare.z) for name, values in true.items()]
+    effects = {"table.feed_forward": {"velocity": -0.5}, "table.backlash": {"width": 1e-5}}
+    values = {name: data.catalogue[name].values(given) for name, given in effects.items()}
+    monkeypatch.setattr(trade, "leaves", lambda _: False)
+    stands = fitting.fit(data, values, bare.z)
+    found = trade.of_the_plan(bare, stands, first)
+    best = min(found, key=lambda item: item.cost)
+    assert best.cost < stands.cost
+    assert best.values["table.bandwidth"]["factor"] == pytest.approx(0.5, rel=0.1)
+    assert best.values["table.delay"]["delay"] == pytest.approx(0.005, rel=0.2)
+    assert trade.of_the_plan(bare, best, first) == []  # there they are already
+    other = {"sensor.damper_stroke.gain": {"factor": 1.1}}
+    assert trade.of_the_plan(bare, fitting.at(data, values | other, bare.z), first) == []

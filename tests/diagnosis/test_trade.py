@@ -131,6 +131,18 @@ def test_of_effects_that_the_data_cannot_tell_apart_one_that_strains_nominal_par
         assert len(found.alternatives) == 1
 
 
+@pytest.mark.parametrize(("ended", "stands"), [(False, "damper.mass"), (True, "sensor.column_force.gain")])
+def test_of_effects_that_the_data_cannot_tell_apart_one_at_the_end_of_its_range_stands_behind(
+    ended: bool, stands: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        fitting, "at_end", lambda item: item.names if ended and item.names == ("damper.mass",) else ()
+    )
+    mass, gain = fit(VALUE), fit({"sensor.column_force.gain": {"factor": 1.1}}, 1e-4)
+    found = plainest(Search(DATA, fit({}), gain, (mass,)))
+    assert found.chosen.names == (stands,)
+
+
 def test_of_effects_that_the_data_cannot_tell_apart_a_value_of_the_plan_stands_before_a_law() -> None:
     value, law = fit(VALUE), fit({"damper.asymmetry": {"share": 0.1}}, -1e-5)
     assert law.cost < value.cost
