@@ -11,6 +11,7 @@ from pathlib import Path
 import common
 from common.errors import EXIT_CODES, InputError
 from common.terminal import cli
+from rths.first_kernel import compilation_said
 
 VERBS = {
     "run": "run the whole test on this machine",
@@ -207,7 +208,8 @@ def command(words: Sequence[str]) -> int:
 
         raise InputError(f"unknown command '{verb}': {nearest(verb, VERBS)}")
     args = parser_for(verb).parse_intermixed_args(words[1:])
-    return int(args.run(args))
+    with compilation_said():
+        return int(args.run(args))
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ from models.registry import Array
 from models.specimens import fit
 from models.system import System
 from recorder.encoding import RowEncoder, RowTable
+from simulation import compilation
 from simulation.sweep.intensity import spectral_acceleration
 
 LAW = preisach.Grid((1.0,), (1.0,), (1.0,))  # of one element, for a kernel's types
@@ -112,5 +113,6 @@ def examined(drive: Array) -> None:
 
 if __name__ == "__main__":
     if not cache.warm():
-        compile_all()
+        with compilation.noticed():
+            compile_all()
     sys.stderr.write(f"kernels compiled into {cache.folder()}\n")

@@ -187,10 +187,12 @@ def in_real_time(
     from common.link.zenoh_link import listenable
     from rths.perform.ending import Ending, verdict
     from rths.perform.processes import Processes
+    from simulation.compilation import NOTICE
 
+    progress = ForwardedProgress() if args.reports else RunProgress(plan.test.duration)
+    NOTICE.say = progress.say
     check(reality)
     processes = Processes()
-    progress = ForwardedProgress() if args.reports else RunProgress(plan.test.duration)
     endpoint = listenable()
     view = None
     ending = Ending(plan)
@@ -198,7 +200,7 @@ def in_real_time(
         with running.announced(plan, endpoint, recording=output):
             if not args.beside:
                 running.alone()
-            warm_up(progress)
+            warm_up()
             for line in before_the_start(plan, output, gate):
                 progress.say(line)
             length = f"{plan.test.duration:g} s{' at most' * plan.served}"
@@ -252,12 +254,11 @@ def check(reality: Reality) -> None:
         link_model(reality.of(role))
 
 
-def warm_up(progress: RunProgress | ForwardedProgress) -> None:
+def warm_up() -> None:
     """Compile the kernels before the processes start, where this machine has not done so yet."""
     from models import cache
 
     if not cache.warm():
-        progress.say("compiling the kernels, once on this machine (about half a minute)")
         from simulation.warm import compile_all
 
         compile_all()

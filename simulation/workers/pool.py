@@ -15,6 +15,7 @@ from multiprocessing import resource_tracker
 from typing import TypeVar
 
 from common.errors import InputError
+from models import cache
 from simulation.workers import cluster
 from simulation.workers.needed import needed
 
@@ -47,6 +48,10 @@ def spread(
 
 def over_processes(function: Callable[[Item], Result], items: Sequence[Item], jobs: int) -> Iterator[Result]:
     """As `spread`, by `jobs` processes, −1 for one per processor."""
+    if not cache.warm():  # otherwise every worker would compile each kernel
+        from simulation.warm import compile_all
+
+        compile_all()
     left = dict(enumerate(items))
     lost = 0
     while left:

@@ -42,7 +42,7 @@ def test_a_risk_refuses_the_test_before_any_process_starts(
 ) -> None:
     monkeypatch.setattr("common.link.zenoh_link.ZenohLink", None)  # no link may open
     monkeypatch.setattr("rths.perform.processes.Processes.start", None)  # and no process start
-    monkeypatch.setattr("rths.perform.run.warm_up", lambda _progress: None)
+    monkeypatch.setattr("rths.perform.run.warm_up", lambda: None)
     (tmp_path / "p.toml").write_text(text)
     output = ["-o", tmp_path / "a.mcap"] if verb != "master" else []
     assert call(*verb.split(), tmp_path / "p.toml", *output) == 3
