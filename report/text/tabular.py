@@ -9,6 +9,7 @@ import itertools
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,10 @@ from numpy.typing import NDArray
 
 from common.errors import InputError
 from common.plan.units import is_unit
-from report.text.cells import numbers, times
+from report.text.cells import Notation, numbers, times
+from report.text.file_kind import is_text, unreadable
+from report.text.lines import LABVIEW, lines_of
+from report.text.misread import misread
 from report.text.text_form import (
     SPACES,
     UNSTATED,
@@ -26,14 +30,17 @@ from report.text.text_form import (
     recognised,
     split,
     unmarked,
+    words,
 )
 
 Columns = dict[str, NDArray[np.float64]]
 
-READABLE = (".csv", ".txt", ".tsv", ".parquet", ".mat", ".npz")
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm")
+READABLE = (*TEXTS, ".parquet", ".mat", ".npz")
 WRITABLE = (".csv", ".parquet", ".mat")
 WIDE = "utf-16"  # the encoding in which some loggers for Windows write
 MAT_NAME = 63  # characters that MATLAB allows
+WHOLE, LARGEST = 1 << 20, (1 << 31) - 1  # bytes more than a file, and at most, that are read as one block
 BRACKETS = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
 
 
@@ -57,6 +64,7 @@ class DataTable(NamedTuple):
     ]  # of the columns that have one in a row below the names, or in brackets in their name
     form: TextForm | None = None  # of a text file
     twice: frozenset[str] = frozenset()  # names of more than one column
+    texts: Mapping[str, str] = MappingProxyType({})  # by name of a column of texts, one of these
 
 
 def read(path: Path) -> Columns:
@@ -74,20 +82,37 @@ def read_table(path: Path, form: StatedForm = UNSTATED) -> DataTable:
     """
     readers = {".parquet": _read_parquet, ".mat": _read_mat, ".npz": _read_npz}
     suffix = path.suffix.lower()
-    if suffix not in READABLE:
-        raise InputError(f"The format of {path} is unknown: give a file that ends in {', '.join(READABLE)}.")
-    if not path.is_file():
-        raise InputError(f"There is no file {path}.")
+    check_kind(path, suffix)
     if suffix in readers and form._replace(columns=()) != UNSTATED:
-        raise InputError(f"{path} is no text: leave out separator, decimal and skip_rows.")
+        raise InputError(f"{path} is no text: leave out separator, decimal, thousands and skip_rows.")
     hint = "" if suffix in readers else "; a map can give its separator, decimal sign and rows to skip"
     try:
         found = DataTable(readers[suffix](path), {}) if suffix in readers else _read_text(path, form)
+    except InputError:
+        raise
     except Exception as error:  # each library has its own exceptions for a damaged file
         raise InputError(f"Cannot read {path}: {str(error).splitlines()[0].rstrip('.')}{hint}.") from error
     if not found.columns:
         raise InputError(f"{path} holds no numeric column{hint}.")
     return found
+
+
+def check_kind(path: Path, suffix: str) -> None:
+    """Raise InputError for a file that cannot be read, of whatever name, and for one whose name does not fit it."""
+    if not path.is_file():
+        raise InputError(f"There is no file {path}.")
+    if kind := unreadable(path):
+        raise InputError(f"{path} is {kind}.")
+    text = is_text(path)
+    if suffix not in READABLE:
+        hint = "; a text with a table of numbers may end in .txt" if text else ""
+        raise InputError(
+            f"The format of {path} is unknown: give a file that ends in {', '.join(READABLE)}{hint}."
+        )
+    if suffix in TEXTS and not text:
+        raise InputError(
+            f"{path} is no text, although its name ends in {suffix}: export it as text from the program that wrote it."
+        )
 
 
 def _read_text(path: Path, stated: StatedForm) -> DataTable:
@@ -97,11 +122,18 @@ def _read_text(path: Path, stated: StatedForm) -> DataTable:
     below = _units(path, form, encoding)
     table = _arrow_table(path, form, encoding, units=bool(below))
     names = [unmarked(name).strip() for name in table.column_names]
-    columns = _numeric(table.rename_columns(names), form.decimal)
+    columns, texts = _numeric(table.rename_columns(names), form.notation)
+    for name in texts.keys() & {*stated.columns}:
+        if wrong := misread(texts[name], form.notation, stated=stated.decimal is not None):
+            raise InputError(f"{path}: column '{name}' holds {wrong}.")
     units = {name: in_name(name) for name in columns} | below
     twice = frozenset(name for name in columns if names.count(name) > 1)
     return DataTable(
-        columns, {name: unit for name, unit in units.items() if name in columns and unit}, form, twice
+        columns,
+        {name: unit for name, unit in units.items() if name in columns and unit},
+        form,
+        twice,
+        {name: next(filter(None, cells), "") for name, cells in texts.items() if name not in columns},
     )
 
 
@@ -112,7 +144,7 @@ def _arrow_table(path: Path, form: TextForm, encoding: str, *, units: bool) -> A
 
     short: list[Any] = []  # rows with another number of cells
 
-    def read(*, skips: bool) -> Any:
+    def read(*, skips: bool, block: int | None = None) -> Any:
         def invalid(row: Any) -> str:
             short.append(row)
             return "skip"
@@ -124,6 +156,7 @@ def _arrow_table(path: Path, form: TextForm, encoding: str, *, units: bool) -> A
                 skip_rows_after_names=1 if units else 0,
                 encoding="utf-8" if encoding == WIDE else encoding,
                 use_threads=not skips,  # else rows have no numbers
+                block_size=block,
             ),
             arrow.ParseOptions(delimiter=form.separator, invalid_row_handler=invalid if skips else None),
             arrow.ConvertOptions(decimal_point=form.decimal),
@@ -132,24 +165,22 @@ def _arrow_table(path: Path, form: TextForm, encoding: str, *, units: bool) -> A
     try:
         return read(skips=False)
     except pa.ArrowInvalid:
-        table = read(skips=True)
+        # A column of which a later part holds texts is one of texts, which the first block alone does not show.
+        table = read(skips=True, block=min(path.stat().st_size + WHOLE, LARGEST))
         above = form.skip_rows + 1 + units  # its rows above the first one of the table
-        if (
-            not short or short[0].number != above + table.num_rows + 1
-        ):  # not behind the last row with all cells
+        if short and short[0].number != above + table.num_rows + 1:  # not behind the last row with all cells
             raise
         return table
 
 
 def _source(path: Path, form: TextForm, encoding: str) -> Path | io.BytesIO:
     """What a reader of narrow characters and single separators reads: a file, or its text as it needs it."""
-    if encoding != WIDE and form.separator != SPACES:
+    if encoding != WIDE and form.separator != SPACES and path.suffix.lower() != LABVIEW:
         return path
-    with path.open(encoding=encoding) as stream:
-        lines = (line.rstrip("\n") for line in stream)
-        if form.separator == SPACES:
-            lines = (SPACES.join(unmarked(line).split()) for line in lines)
-        return io.BytesIO("\n".join(lines).encode("utf-8" if encoding == WIDE else encoding))
+    lines = (line.rstrip("\r\n") for line in lines_of(path, encoding))
+    if form.separator == SPACES:
+        lines = (SPACES.join(words(unmarked(line))) for line in lines)
+    return io.BytesIO("\n".join(lines).encode("utf-8" if encoding == WIDE else encoding))
 
 
 def _encoding(path: Path) -> str:
@@ -167,12 +198,12 @@ def _encoding(path: Path) -> str:
 
 def _units(path: Path, form: TextForm, encoding: str) -> dict[str, str]:
     """The row below the names where it holds texts and no number, by name: a row of units; empty where it is data."""
-    with path.open(encoding=f"{encoding}-sig" if encoding == "utf-8" else encoding, newline="") as stream:
-        lines = list(itertools.islice(stream, form.skip_rows, form.skip_rows + 2))
+    whole = lines_of(path, f"{encoding}-sig" if encoding == "utf-8" else encoding)
+    lines = list(itertools.islice(whole, form.skip_rows, form.skip_rows + 2))
     rows = split(lines, form.separator)
     if len(rows) < 2 or not any(cell.strip() for cell in rows[1]):
         return {}
-    if any(is_number(cell, form.decimal) for cell in rows[1]) or times(rows[1][:1]) is not None:
+    if any(is_number(cell, form.notation) for cell in rows[1]) or times(rows[1][:1]) is not None:
         return {}
     return {name.strip(): unit.strip().strip("[]()") for name, unit in zip(*rows, strict=False)}
 
@@ -186,13 +217,15 @@ def in_name(name: str) -> str:
 def _read_parquet(path: Path) -> Columns:
     from pyarrow import parquet
 
-    return _numeric(parquet.read_table(path))
+    return _numeric(parquet.read_table(path), Notation())[0]
 
 
-def _numeric(table: Any, decimal: str = ".") -> Columns:
+def _numeric(table: Any, notation: Notation) -> tuple[Columns, dict[str, list[str]]]:
+    """The columns with numbers or times, and the cells of all that hold other texts than times."""
     import pyarrow as pa
 
     columns: Columns = {}
+    texts: dict[str, list[str]] = {}
     for name, column in zip(table.column_names, table.columns, strict=True):
         if not name.strip():  # a column without a name cannot be asked for
             continue
@@ -201,10 +234,12 @@ def _numeric(table: Any, decimal: str = ".") -> Columns:
         elif pa.types.is_string(column.type) or pa.types.is_temporal(column.type):
             cells = ["" if cell is None else cell for cell in column.cast(pa.string()).to_pylist()]
             found = times(cells)
-            found = numbers(cells, decimal) if found is None else found
+            if found is None:
+                texts[name.strip()] = cells
+                found = numbers(cells, notation)
             if found is not None:
                 columns[name.strip()] = found
-    return columns
+    return columns, texts
 
 
 def _read_mat(path: Path) -> Columns:

@@ -32,7 +32,10 @@ UNJUDGED = "the link cannot be judged, because the data hold no numbers and no t
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `import`."""
     parser.add_argument(
-        "data", type=Path, metavar="DATA", help="measurements: .csv, .txt, .tsv, .parquet, .mat or .npz"
+        "data",
+        type=Path,
+        metavar="DATA",
+        help="measurements: text (.csv, .txt, .tsv, .dat, .asc, .lvm), .parquet, .mat or .npz",
     )
     parser.add_argument(
         "--map",
@@ -136,8 +139,10 @@ def show(args: argparse.Namespace, mapping: ImportMap, found: OnTicks, told: Imp
     say(f"absent: {', '.join(absent) or 'none'}\n")
     if (form := told.form) and form != TextForm():
         between = {"\t": "tabs", " ": "spaces"}.get(form.separator, f"'{form.separator}'")
+        thousands = f", thousands parted by '{form.thousands}'" * bool(form.thousands)
         say(
-            f"text: {between} between columns, decimal sign '{form.decimal}', {form.skip_rows} rows above the names\n"
+            f"text: {between} between columns, decimal sign '{form.decimal}'{thousands}, {form.skip_rows} rows above "
+            "the names\n"
         )
     if found.units:
         units = (f"{name} in {unit}" for name, unit in found.units.items())

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from report.text.cells import number, times
+from report.text.cells import Notation, number, times
 from report.text.tabular import read_table
 from tests.rths.imports import COMMAND, DRIVE, LATE, TIMES, table
 
@@ -138,7 +138,7 @@ def test_a_table_that_says_too_little_is_refused_in_one_sentence(
     ],
 )
 def test_a_cell_holds_a_number_or_none(cell: str, decimal: str, value: float | None) -> None:
-    assert number(cell, decimal) == (None if value is None else pytest.approx(value, nan_ok=True))
+    assert number(cell, Notation(decimal)) == (None if value is None else pytest.approx(value, nan_ok=True))
 
 
 def test_times_are_those_of_all_cells_or_none() -> None:

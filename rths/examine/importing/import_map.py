@@ -17,7 +17,7 @@ from common.plan.units import converted
 from common.recording.imported import FILTERS, RIPPLING, LoggerFilter
 from common.roles import MASTER, latency_topic, name_of
 from common.signals import FieldType, Signal
-from report.text.text_form import StatedForm
+from report.text.text_form import SPACES, StatedForm
 
 Known = dict[str, tuple[str, Signal]]  # by our name of a signal its topic and its row there
 GIVEN = (FieldType.NUMBER, FieldType.STOREYS, FieldType.INDEX)
@@ -102,7 +102,12 @@ class SignalSource:
 
 
 APART = ("value", "filter", "resolution", "offset")  # keys that need their own check
-FORM = ("separator", "decimal", "skip_rows")  # keys of a text file, recognised where they are left out
+FORM = (
+    "separator",
+    "decimal",
+    "thousands",
+    "skip_rows",
+)  # keys of a text file, recognised where they are left out
 OUR_OWN = ("scaled", "delay_stated")  # fields that are set here and cannot be given as keys
 
 
@@ -121,6 +126,7 @@ class ImportTable:
     static: bool = key("each row is one tick, whatever its time", default=False)
     separator: str = key("character between columns", default="")
     decimal: str = key("decimal sign", default=".", choices=(".", ","))
+    thousands: str = key("what parts groups of three digits", default="", choices=("'", " ", ",", "."))
     skip_rows: int = key("rows before that of the names", default=0, least=0)
 
 
@@ -211,8 +217,13 @@ def check_form(path: Path, form: StatedForm) -> None:
     """Raise InputError for a form that no text has."""
     if form.separator is not None and len(form.separator) != 1:
         raise InputError(f"{path}: separator is {form.separator!r}, but must be one character.")
-    if form.separator is not None and form.separator == form.decimal:
-        raise InputError(f"{path}: separator and decimal are both {form.decimal!r}: give each its own.")
+    pairs = [("separator", "decimal"), ("decimal", "thousands")]
+    pairs += [("separator", "thousands")] * (
+        form.separator == SPACES
+    )  # another one may part both, in quoted cells
+    for one, other in pairs:
+        if getattr(form, one) is not None and getattr(form, one) == getattr(form, other):
+            raise InputError(f"{path}: {one} and {other} are both {getattr(form, one)!r}: give each its own.")
 
 
 def check_single(path: Path, plan: Plan, name: str, known: Known) -> None:

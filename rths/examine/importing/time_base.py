@@ -183,7 +183,12 @@ def pick(table: DataTable, name: str, data: Path) -> Array:
     if name in table.twice:
         raise InputError(f"{data} has more than one column '{name}': give each a name of its own.")
     if name not in table.columns:
-        if table.form and all(is_number(one, table.form.decimal) for one in table.columns):
+        if table.form and all(is_number(one, table.form.notation) for one in table.columns):
             raise InputError(f"{data} has no row of names: write one above the numbers, with '{name}' in it.")
+        if name in table.texts:
+            raise InputError(
+                f"{data}: column '{name}' holds texts such as '{table.texts[name]}', but must hold numbers, or "
+                "times of day such as 13:30:05.2, 1:30:05.2 PM or 2024-02-29 13:30:05.2."
+            )
         raise InputError(f"{data} has no numeric column '{name}': {nearest(name, table.columns)}")
     return table.columns[name]
