@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from common.recording.run import Run
 from report.facts.circumstances import VIRTUAL, clock_of
+from report.facts.machine import by_itself
 from report.pictures import histories, hysteresis, latency, spectra, synchronisation, tracking
 from report.pictures.figure import DOUBLE, SINGLE
 
@@ -24,6 +25,7 @@ class Picture(NamedTuple):
     size: tuple[float, float]  # inches, for one column
     double: tuple[float, float]  # inches, across two columns
     draw: Callable[[Run, Any], bool]
+    alone: str = ""  # what it shows of a machine by itself, where that is something else
 
     def on(self, recording: Run, canvas: Any) -> bool:
         """Draw; False where the recording lacks the signals, or holds numbers that cannot be drawn."""
@@ -33,8 +35,15 @@ class Picture(NamedTuple):
             return False
 
 
+def shows(recording: Run, picture: Picture) -> str:
+    """What a picture of a recording shows: no building where none was recorded."""
+    return (picture.alone if by_itself(recording) else "") or picture.text
+
+
 def needs(recording: Run, picture: Picture) -> str:
     """The signals that a picture needs, and why a test in virtual time has no latency."""
+    if picture.name == "histories" and by_itself(recording):
+        return "a force, an acceleration, or a motion beside which a force is drawn"
     virtual = picture.name == "latency" and clock_of(recording) == VIRTUAL
     return picture.needs + (", and this one ran in virtual time" if virtual else "")
 
@@ -47,6 +56,7 @@ _ALL = (
         (SINGLE, 5.6),
         (DOUBLE, 6.0),
         histories.draw,
+        "the machine over time, which shows drift, clipped peaks and holes",
     ),
     Picture(
         "hysteresis",
@@ -64,6 +74,7 @@ _ALL = (
         (SINGLE, 6.2),
         (DOUBLE, 3.8),
         synchronisation.draw,
+        "measured over target of the machine: a delay opens the line to a loop, an amplitude error tilts it",
     ),
     Picture(
         "tracking",
@@ -82,6 +93,7 @@ _ALL = (
         (SINGLE, 4.6),
         (DOUBLE, 4.6),
         spectra.draw,
+        "amplitude density of the machine's motion and of its tracking error over frequency",
     ),
     Picture(
         "latency",

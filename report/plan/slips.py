@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from common.plan.kinds import COLUMN
@@ -61,8 +62,13 @@ def slips(plan: Plan, motion: GroundMotion, found: Findings) -> list[PlanSlip]:
         *specimen_slip(plan),
         *transfer_slips(plan),
         *sensor_slips(strict(plan)),
-        *limit_slips(strict(plan), found),
+        *limit_slips(strict(plan), {} if found.unstable or found.peaks is None else found.peaks.every),
     ]
+
+
+def of_machine(plan: Plan) -> list[PlanSlip]:
+    """What looks like a slip of units of a machine by itself: no motion of a test says how far it goes."""
+    return [*transfer_slips(plan), *sensor_slips(strict(plan)), *limit_slips(strict(plan), {})]
 
 
 def interval_slip(plan: Plan, period: float) -> list[PlanSlip]:
@@ -178,10 +184,9 @@ def sensor_slips(plan: Plan) -> list[PlanSlip]:
     return result
 
 
-def limit_slips(plan: Plan, found: Findings) -> list[PlanSlip]:
-    """Limits in mm, limits in kN, and a drift that no storey has."""
+def limit_slips(plan: Plan, peaks: Mapping[str, float]) -> list[PlanSlip]:
+    """Limits in mm, limits in kN beside the `peaks` expected, and a drift that no storey has."""
     result = []
-    peaks = {} if found.unstable or found.peaks is None else found.peaks.every
     for name, limit in vars(plan.limits).items():
         unit = LIMITS[name].unit
         if unit == "m" and LARGEST_STROKE < limit < math.inf:

@@ -21,14 +21,14 @@ def show(facts: Mapping[str, Any]) -> None:
         rows += [peak_row(name, one) for name, one in facts["peaks"].items()]
         table([[row[0], *row[1:4], row[4].ljust(BAR)] for row in rows])
         write("\n")
-    else:
+    elif facts["structure"]:
         write("The simulated loop is unstable, so that it has no peaks to compare with limits.\n\n")
     for line in concerns(facts):
         write(f"{line}\n")
 
 
 def described(facts: Mapping[str, Any]) -> Iterator[str]:
-    """Lines on the test, the building, the transfer systems, the delay and the recording."""
+    """Lines on the test, the building or else the machine, the transfer systems, the delay and the recording."""
     first, *others = named(facts)
     yield f"{first[0]}: {first[1]}"
     for name, text in others:
@@ -42,6 +42,10 @@ def named(facts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         f"test '{facts['test']}', {facts['duration']:g} s in {facts['ticks']} intervals of "
         f"{facts['interval'] * 1e3:g} ms",
     )
+    if not facts["structure"]:
+        for name, values in facts["machine"].items():
+            yield name, ", ".join(value_text(key, one) for key, one in values.items())
+        return
     ground = facts["ground_motion"]
     yield "ground motion", f"{ground['text']}; × {ground['scale']:g}: peak {ground['peak']:.3g} m/s²"
     if facts["structure"]["model"]:
@@ -60,6 +64,12 @@ def named(facts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield rig["where"], rig_text(rig)
     yield "delay", delay_text(facts["delay"])
     yield "recording", f"about {facts['recording']['bytes'] / 1e6:.1f} MB in {facts['recording']['folder']}"
+
+
+def value_text(name: str, one: Mapping[str, Any]) -> str:
+    """A value that a plan states, with its unit."""
+    value = f"{one['value']:g}" if isinstance(one["value"], float) else str(one["value"])
+    return f"{name} {value} {one['unit']}".rstrip()
 
 
 def mode_text(mode: Mapping[str, Any]) -> str:
@@ -156,5 +166,10 @@ def concerns(facts: Mapping[str, Any]) -> Iterator[str]:
         yield f"{text[0].upper()}{text[1:]}: calibrate the sensor, or correct the date in the plan."
     for risk in facts["refused"]:
         yield f"pre-flight would refuse ({risk['name']}): {risk['sentence']}."
-    if facts["ready"]:
+    if not facts["structure"]:
+        yield (
+            "The plan is of a machine by itself, as it states no [structure] and no [ground_motion]: a test of it "
+            "would have those of the default test, which --building describes."
+        )
+    elif facts["ready"]:
         yield "Pre-flight would let this test begin, as far as it can be judged without the laboratories."

@@ -10,7 +10,7 @@ from common.roles import name_of, title
 from common.terminal.telling import Tell
 from report.facts.laboratories import views
 from report.page import data_uri
-from report.pictures import PICTURES, Picture, figure, needs
+from report.pictures import PICTURES, Picture, figure, needs, shows
 
 INCH = 96  # CSS pixels
 WIDE = ("histories",)  # pictures over the whole test, which get two columns where there is room
@@ -55,7 +55,7 @@ def draw(part: Run, role: str, picture: Picture) -> DrawnPicture | None:
         data_uri(narrow[0]),
         narrow[1],
         f"{picture.name.capitalize()}{of}",
-        f"{picture.name.capitalize()}: {picture.text}.",
+        f"{picture.name.capitalize()}: {shows(part, picture)}.",
         data_uri(wide[0]) if wide else "",
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from common.lab.preflight import ACCEPTED, LINK, PASSED, SENSORS
 from common.recording.run import Run
+from report.facts.machine import own_plan
 from report.page import frame, render
 from report.run import tables, verdict
 from report.run.drawing import Pictures
@@ -37,7 +38,7 @@ def page(run: Run, summary: Summary, drawn: Pictures, left_out: dict[str, str]) 
         calibration=tables.calibration(run),
         preflight=tables.events(run, *BEFORE),
         events=tables.events(run),
-        plan=run.metadata.get("plan", {}).get("toml", ""),
+        plan=own_plan(run),
         provenance=tables.provenance(run, summary),
         kept=tables.kept(run),
     )

@@ -14,6 +14,7 @@ from common.recording.run import CLOCK, GROUND, MACHINES, PEAKS, Run
 from common.recording.writer import SIGNALS
 from common.roles import MASTER, name_of
 from report.facts.laboratories import plan_of
+from report.facts.machine import by_itself
 from report.page import breakable
 from report.run.verdict import Margin, Summary, amount
 from report.text.formats import MISSING, milliseconds, reading, storey_rows, tracked
@@ -44,7 +45,7 @@ def facts(run: Run, summary: Summary) -> list[tuple[str, str]]:
         ("data", run.metadata.get("import", {}).get("data", "")),
         ("duration", f"{plan.test.duration:g} s" if plan else ""),
         ("interval", f"{plan.test.interval * 1e3:g} ms" if plan else ""),
-        ("storeys", str(plan.storeys) if plan else ""),
+        ("storeys", str(plan.storeys) if plan and not by_itself(run) else ""),
         ("slaves", ", ".join(summary["slaves"])),
         ("part tested", run.metadata.get("bench", {}).get("part", "")),
         ("outcome", outcome(ended)),

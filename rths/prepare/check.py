@@ -10,9 +10,11 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 from common.plan.plan import Plan
+from common.plan.toml_file import load_tables
 from common.terminal import cli
 from report.text.progress import Progress
 
@@ -25,6 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="only list the classes that the plan names, and import none of them",
     )
+    parser.add_argument(
+        "--building",
+        action="store_true",
+        help="of a machine by itself, describe the test that it would have with the building of the default test",
+    )
     cli.json_argument(parser, "write what the plan describes as JSON on standard output")
 
 
@@ -33,10 +40,7 @@ def run(args: argparse.Namespace) -> int:
     plan = cli.load_plan(args)
     if args.classes:
         return listed(plan, as_json=args.json)
-    with Progress("simulating the test"):
-        from report.plan.facts import facts
-
-        found = facts(plan, cli.plan_path(args.plan))
+    found = described(plan, cli.plan_path(args.plan), building=args.building)
     if args.json:
         sys.stdout.write(json.dumps(printable(found)) + "\n")
     else:
@@ -44,6 +48,19 @@ def run(args: argparse.Namespace) -> int:
 
         show(printable(found))
     return 0 if found["ready"] else 1
+
+
+def described(plan: Plan, file: Path, *, building: bool) -> dict[str, Any]:
+    """What a plan describes: a machine by itself without the default test's `building`, unless that is asked for."""
+    from report.plan import machine
+
+    tables = load_tables(file, "plan")
+    if not building and machine.by_itself(plan, tables):
+        return machine.facts(plan, file, tables)
+    with Progress("simulating the test"):
+        from report.plan.facts import facts
+
+        return facts(plan, file)
 
 
 def listed(plan: Plan, *, as_json: bool) -> int:
