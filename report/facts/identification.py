@@ -19,6 +19,7 @@ from laboratories.identification import actuator, column, damper, device, step_r
 from laboratories.identification.estimate import Estimate
 from models.excitation import ProgrammeSegment
 from models.registry import Array
+from report.facts import force_range
 from report.facts.laboratories import plan_of
 
 NEEDED = {
@@ -56,8 +57,10 @@ def topic_of(run: Run, part: str) -> str:
     return next((topic for topic in topics if set(names) <= run.columns.get(topic, {}).keys()), "")
 
 
-def identify(run: Run, part: str = "") -> dict[str, Any]:
+def identify(run: Run, part: str = "", most: float = math.inf) -> dict[str, Any]:
     """The identification of a part as plain values: parameters with 95 % intervals, and what else the test shows.
+
+    Of a column only rows with a force up to `most` (N) are used.
 
     Raises:
         InputError: the recording lacks the part's signals, or they cannot carry an identification.
@@ -68,7 +71,9 @@ def identify(run: Run, part: str = "") -> dict[str, Any]:
         raise InputError(
             f"{run.path} cannot identify the {part}: it needs {', '.join(names)} of the {topic}."
         )
-    return {"part": part, **IDENTIFIERS[part](run, interval_of(run))}
+    interval = interval_of(run)
+    found = of_column(run, interval, most) if part == "column" else IDENTIFIERS[part](run, interval)
+    return {"part": part, **found}
 
 
 def interval_of(run: Run) -> float:
@@ -90,23 +95,38 @@ def plain(found: dict[str, Estimate]) -> dict[str, dict[str, Any]]:
     return result
 
 
-def of_column(run: Run, interval: float) -> dict[str, Any]:
-    """Elastic stiffness, with the dashpot where the plan has one; with a static cyclic test also every cycle."""
+def of_column(run: Run, interval: float, most: float) -> dict[str, Any]:
+    """Elastic stiffness, with the dashpot where the plan has one; with a static cyclic test also every cycle.
+
+    Rows with a force above `most` (N) are left out, and cycles with such a row.
+    """
     columns = run.columns[topic_of(run, "column")]
     deformation, force = seen(run, "column", "column_force", "column_displacement"), columns["column_force"]
+    used = force_range.within(run, force, most)
+    left_out = force_range.said(used, most)
     static = [segment for segment in segments(run) if segment.name == "static"]
     if not static:
-        plan, causes = plan_of(run), {"stiffness": (deformation, "N/m")}
+        plan, causes = plan_of(run), {"stiffness": (deformation[used], "N/m")}
         if plan is not None and plan.column.damping > 0.0 and not is_static(run):
-            causes["damping"] = np.gradient(deformation, interval), "N·s/m"
-        fit = column.regression(causes, force)
-        return {"parameters": plain(fit.parameters), "nrmse": fit.nrmse}
+            causes["damping"] = np.gradient(deformation, interval)[used], "N·s/m"
+            if plan.column.stiffness == 0.0:  # a law of a dashpot alone
+                causes = dict(reversed(causes.items()))
+        fit = column.regression(causes, force[used])
+        return {"parameters": plain(fit.parameters), "nrmse": fit.nrmse, **left_out}
     part = slice(static[0].begin, static[0].end)
     amplitudes = [value for name, value in static[0].values.items() if name.startswith("amplitude")]
     found = column.cycles(deformation[part], force[part], amplitudes)
+    whole = [cycle for cycle in found.cycles if used[part][cycle.begin : cycle.end].all()]
+    smallest = min(amplitudes)
+    if any(cycle.nominal == smallest for cycle in {*found.cycles} - {*whole}):
+        raise InputError(
+            f"{run.path}: the cycles of {1e3 * smallest:g} mm, which show the elastic stiffness, have a column_force "
+            f"above --max-force {most:g} N: give a larger one."
+        )
     return {
         "parameters": plain({"elastic_stiffness": found.stiffness}),
-        "cycles": [cycle._asdict() for cycle in found.cycles],
+        "cycles": [cycle._asdict() for cycle in whole],
+        **left_out,
     }
 
 
@@ -227,8 +247,7 @@ def of_device(run: Run, plan: Plan, role: str, kind: Device) -> dict[str, Any] |
     return {"part": name, "parameters": plain(fit.parameters), "nrmse": fit.nrmse}
 
 
-IDENTIFIERS: dict[str, Callable[[Run, float], dict[str, Any]]] = {
-    "column": of_column,
+IDENTIFIERS: dict[str, Callable[[Run, float], dict[str, Any]]] = {  # of parts without a range of forces
     "actuator": of_actuator,
     "table": of_table,
     "damper": of_damper,

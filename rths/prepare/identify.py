@@ -15,6 +15,7 @@ from common.terminal.telling import Tell
 from report.text.progress import Progress
 
 PARTS = ("column", "actuator", "table", "damper")
+LAW = "column, model "  # what the part of a report on a fitted model begins with
 OF_SLAVE = ("table", "damper")
 LARGE = 0.05  # misfit of a model over its signal, from which on its parameters mean little
 UNDETERMINED = 1e6  # times its lower end, from which on an interval says nothing
@@ -40,6 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PLAN",
         help="fit the parameters of your own kind of laboratory in this plan, whose class is run",
     )
+    parser.add_argument(
+        "--max-force",
+        metavar="N",
+        help="use only rows of the column whose force is at most so large, in newtons or with a unit as in '40 kN'",
+    )
     cli.json_argument(parser, "write the report as JSON on standard output")
 
 
@@ -50,18 +56,22 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(json.dumps({"file": str(args.file), "parts": reports}) + "\n")
     else:
-        for report in reports:
-            show(report)
+        lawful = any(is_law(report) for report in reports)
+        for report in law_first(reports):
+            show(report, beside_law=lawful and report["part"] == "column")
     return 0
 
 
 def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
     """The reports on all parts that are asked for; raises InputError where there is none."""
     from common.recording.reader import read
+    from report.facts.force_range import most_force
     from report.facts.identification import identify, part_of, possible
 
-    recording = read(args.file)
+    recording, most = read(args.file), most_force(args.max_force)
     if args.plan:
+        if args.max_force:
+            raise InputError("--max-force is for the force of a column: leave it out, or leave out --plan.")
         return devices(recording, args.plan, tell)
     reports = []
     roles = recording.roles or (MASTER,)
@@ -72,15 +82,37 @@ def identified(args: argparse.Namespace, tell: Tell) -> list[dict[str, Any]]:
         own = [part for part in parts if role == roles[0] or part in OF_SLAVE]
         for part in own:
             tell(part, 0, 0)
-            reports.append(identify(view, part) | named(part, role))
+            reports.append(identify(view, part, most) | named(part, role))
     if not reports:
         raise InputError(
             f"{args.file} does not hold inputs and outputs of any part: see rths inspect {args.file}, and give "
             "--plan PLAN for a kind of laboratory of your own."
         )
-    model = args.fit or planned_model(recording, [report["part"] for report in reports])
+    parts = [report["part"] for report in reports]
+    if args.max_force and not (args.fit or "column" in parts):
+        raise InputError(
+            f"--max-force is for the force of a column, and none of {args.file} can be identified: leave it out."
+        )
+    model = args.fit or planned_model(recording, parts)
     tell(f"column, model {model}" if model else "", 0, 0)
-    return reports + ([fitted(recording, model)] if model else [])
+    return reports + ([fitted(recording, model, most)] if model else [])
+
+
+def law_first(reports: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The reports in the order in which they are printed: a law of the column before the spring beside it.
+
+    A law that is a spring itself stays last: it says less than the spring's report.
+    """
+    laws = [report for report in reports if is_law(report)]
+    others = [report for report in reports if not is_law(report)]
+    place = next((k for k, report in enumerate(others) if report["part"] == "column"), len(others))
+    return [*others[:place], *laws, *others[place:]]
+
+
+def is_law(report: dict[str, Any]) -> bool:
+    """Whether a report is on a law that is more than a spring."""
+    part = str(report["part"])
+    return part.startswith(LAW) and part != f"{LAW}linear"
 
 
 def planned_model(recording: Any, parts: list[str]) -> str:
@@ -122,19 +154,26 @@ def named(part: str, role: str) -> dict[str, str]:
     return {"part": f"{part}.{name_of(role)}"} if name_of(role) and part in OF_SLAVE else {}
 
 
-def fitted(recording: Any, model: str) -> dict[str, Any]:
-    """A hysteretic model fitted to the column's force."""
-    from models.specimens.fit import fit
+def fitted(recording: Any, model: str, most: float) -> dict[str, Any]:
+    """A hysteretic model fitted to the column's force in rows where that is at most as large, N."""
+    from report.facts.force_range import fitted_within, said, within
 
     columns = recording.columns.get("master", {})
     if not {"column_displacement", "column_force"} <= columns.keys():
         raise InputError(f"{recording.path} has no column_displacement and column_force to fit '{model}' to.")
-    found = fit(model, columns["column_displacement"], columns["column_force"])
+    force = columns["column_force"]
+    used = within(recording, force, most)
+    found = fitted_within(model, columns["column_displacement"], force, used)
     parameters = {
         name: {"value": value} | determined(*found.intervals[name]) | {"unit": unit_of(name)}
         for name, value in found.parameters.items()
     }
-    return {"part": f"column, model {model}", "parameters": parameters, "nrmse": found.nrmse}
+    return {
+        "part": f"{LAW}{model}",
+        "parameters": parameters,
+        "nrmse": found.nrmse,
+        **said(used, most),
+    }
 
 
 def determined(low: float, high: float) -> dict[str, float | None]:
@@ -148,8 +187,8 @@ def unit_of(name: str) -> str:
     return "N/m" if name == "stiffness" else UNITS.get(name, "m" if name.endswith("displacement") else "")
 
 
-def show(report: dict[str, Any]) -> None:
-    """One part's report as text."""
+def show(report: dict[str, Any], *, beside_law: bool) -> None:
+    """One part's report as text; a spring `beside_law` leaves what the law describes."""
     report = all_shown(report)
     from report.text.terminal import table
 
@@ -163,9 +202,13 @@ def show(report: dict[str, Any]) -> None:
     table(rows)
     if "model" in report:
         sys.stdout.write(f"parameters are those of the {report['model']}\n")
+    if left := report.get("left_out"):
+        sys.stdout.write(
+            f"left out, as their force is above {left['max_force']:g} N: {left['rows']} of {left['of']} rows\n"
+        )
     if "nrmse" in report:
         sys.stdout.write(f"misfit (NRMSE): {misfit(report['nrmse'])}\n")
-        sys.stdout.write(remark(report["nrmse"]))
+        sys.stdout.write(remark(report["nrmse"], beside_law=beside_law))
     if "bandwidth" in report:
         band = report["bandwidth"]
         sys.stdout.write(
@@ -188,12 +231,14 @@ def misfit(value: Any) -> str:
     return f"{value:.4f}"
 
 
-def remark(value: Any) -> str:
+def remark(value: Any, *, beside_law: bool) -> str:
     """A sentence on a model that leaves much of a signal, empty for one that does not."""
     missed = value if isinstance(value, dict) else {"the signal": value}
     worst = max(missed, key=lambda name: missed[name])
     if missed[worst] < LARGE:
         return ""
+    if beside_law:
+        return f"A spring leaves {100.0 * missed[worst]:.0f} % of {worst}, which the model above describes or leaves.\n"
     return (
         f"The model leaves {100.0 * missed[worst]:.0f} % of {worst}: the part does something else as well, so that the "
         "intervals do not hold; rths diagnose looks for what it is.\n"
