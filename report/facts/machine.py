@@ -9,7 +9,6 @@ import tomli_w
 from common import signals
 from common.plan.plan import Plan
 from common.recording.run import Run
-from report.facts.laboratories import whole_plan
 
 OF_BUILDING = {row.name for row in (*signals.BUILDING, signals.NUMERICAL)} - {"seq", "t"}
 APART = ("import", "bench")  # metadata of recordings that need not be of a whole test
@@ -24,6 +23,8 @@ def by_itself(run: Run) -> bool:
 
 def own_plan(run: Run) -> str:
     """The recorded plan (TOML); of a machine by itself without the tables of a building that are the default test's."""
+    from report.facts.laboratories import whole_plan  # slow to load, and `by_itself` does without it
+
     text = run.metadata.get("plan", {}).get("toml", "")
     plan = whole_plan(run) if text and by_itself(run) else None
     if plan is None:
