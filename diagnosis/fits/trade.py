@@ -188,10 +188,10 @@ def of_the_plan(bare: Fit, fit: Fit, first: Sequence[Fit]) -> list[Fit]:
     One of the two by itself explains much then. `first` are the fits with one effect; each of two begins at half of
     what it is alone.
     """
-    sites = {fit.data.catalogue[name].site for name in fit.names}
-    if len(sites) != 1 or freedom(fit)[0] < 2 or leaves(fit):
+    if freedom(fit)[0] < 2 or leaves(fit):
         return []
-    if set(fit.names) <= set(values_of_plan(fit.data, fit.values)):
+    sites = {fit.data.catalogue[name].site for name in fit.names}
+    if len(sites) != 1 or set(fit.names) <= set(values_of_plan(fit.data, fit.values)):
         return []
     plain = [item for item in first if freedom(item)[0] == 1 and values_of_plan(item.data, item.values)]
     if all(excess(item) > FOLLOWED * excess(bare) for item in plain):
