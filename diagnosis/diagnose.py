@@ -189,7 +189,7 @@ def remarks(
         *reversed_signs(datas),
         *repeating(held),
         *outliers.told(verdicts),
-        *uneven_noise.growing(verdicts),
+        *uneven_noise.told(verdicts),
         *(verdict.own.text for verdict in verdicts if verdict.own is not None and verdict.own.text),
         *doubted(verdicts),
         *drifting(verdicts),

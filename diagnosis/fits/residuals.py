@@ -23,8 +23,8 @@ from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, Part
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.noise import colour
+from diagnosis.signals.noise.level import white_rms
 from diagnosis.signals.noise.model import NoiseModel
-from diagnosis.signals.noise.spikes import deviation
 from diagnosis.signals.predictors.ceiling import Crosswise
 from laboratories.effects import CATALOGUE
 from laboratories.effects.effect import Effect
@@ -36,7 +36,6 @@ FEWEST = 250  # of these that a recording must have: noise of a colour is known 
 BLOCK = 1.0  # s, of the blocks that are held out in turn: longer than a model's error is correlated
 HELD_OUT = (2, 4)  # of every five blocks, these
 STEPPING = 2.0  # steps over the noise from which on a reading is rounded to more than its noise
-BELOW = 0.8  # rms of differences over what their median says, below which these are steps: noise has no less than one
 COARSE = 3.0  # steps that count as noise where a reading that is rounded to more than its noise rests on few of them
 WITHIN = 0.04  # s, within which the steps are counted that such a reading crosses
 # Averaged samples that a step lasts where a reading rests on it, and the share of the test in which no step may last so
@@ -44,10 +43,6 @@ WITHIN = 0.04  # s, within which the steps are counted that such a reading cross
 LONGEST_STEP, MOVING = 5.0, 0.5
 HELD = 0.9  # of what a moving reading errs by from its steps, from which on its noise holds that as well
 SPARSE = 0.5  # of an averaged sample's ticks that must be there
-# Deviations beyond which a sample counts as this far out: of normal noise one sample in 5e8 is, and what impacts leave
-# in all signals counts as little. The rms of Student's t with four degrees of freedom is then found to 2 to 6 %, where
-# the median alone says 13 % too little (simulated).
-OUTERMOST = 6.0
 KEPT = 32  # systems with moved parameters: fits over the parameters of effects keep to one, their slopes to one each
 SUMS = 50  # of samples at least, from which the rms of white noise is known to a few per cent
 ROUNDED = 1e-9  # of a number of samples that is whole but for the rounding of a computer
@@ -144,7 +139,7 @@ class Data:
         for size in np.unique(together):
             some = residual[: len(residual) // size * size, together == size]
             sums = some.reshape(-1, size, some.shape[1]).sum(axis=1) / math.sqrt(size)
-            result[together == size] = noise(sums)
+            result[together == size] = white_rms(sums)
         return result
 
     def together(self, ticks: int) -> NDArray[np.int64]:
@@ -383,29 +378,3 @@ def steps_last(data: Data, place: int) -> Array:
     spans = ndimage.maximum_filter1d(reading, size) - ndimage.minimum_filter1d(reading, size)
     crossed = data.averaged(spans) / (math.sqrt(data.group) * data.rounded[place])
     return np.clip(WITHIN / (interval * data.group) / np.maximum(crossed, 1e-9), 1.0, most)
-
-
-def noise(residual: Array) -> Array:
-    """Rms of the white part of each residual (ticks, signals).
-
-    By medians, which the bends of a motion do not move. The error of steps that noise does not hide takes few values,
-    of which the median may be far above the rms; no noise is louder than that.
-    """
-    apart = np.abs(np.diff(residual, n=4, axis=0))
-    usual = tails(apart) * 1.4826 * np.median(apart, axis=0)
-    rms = np.sqrt(np.mean(np.square(apart), axis=0))
-    return np.asarray(np.where(rms < BELOW * usual, rms, usual) / math.sqrt(70.0))
-
-
-def tails(apart: Array) -> float:
-    """Rms of noise over what the median of its size `apart` (samples, signals) says; one for normal noise.
-
-    Only what all of several signals show counts: a logger treats its channels alike, while impacts and friction show in
-    some. The bends of a hysteresis in a single force are no tails.
-    """
-    ratios = []
-    for column in apart.T:
-        around = deviation(column)
-        if np.all(around > 0.0):
-            ratios.append(float(np.sqrt(np.mean(np.square(np.minimum(column / around, OUTERMOST))))))
-    return max(1.0, min(ratios)) if len(ratios) > 1 else 1.0

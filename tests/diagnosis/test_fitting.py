@@ -24,6 +24,7 @@ from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.nuisances import of_building
 from diagnosis.recorded.parts import MODEL_ERROR, LaboratoryPart, Part
 from diagnosis.recorded.record import Record
+from diagnosis.signals.noise import level
 from laboratories.effects import CATALOGUE
 from models.registry import Array
 from models.system import System
@@ -108,8 +109,8 @@ def test_the_noise_levels_are_estimated(cases: Cases, kind: str, default_plan: P
 def test_the_noise_estimate_ignores_a_smooth_signal() -> None:
     t = np.arange(5000) * 0.002
     smooth = np.stack([1e3 * np.sin(2 * np.pi * 3 * t), 50 * t**2], axis=1)
-    assert residuals.noise(smooth + 0.1 * white(0, 5000, 2)) == pytest.approx([0.1, 0.1], rel=0.05)
-    assert np.all(residuals.noise(smooth) < 1e-3)
+    assert level.white_rms(smooth + 0.1 * white(0, 5000, 2)) == pytest.approx([0.1, 0.1], rel=0.05)
+    assert np.all(level.white_rms(smooth) < 1e-3)
 
 
 def test_residuals_of_white_noise_have_unit_variance(cases: Cases) -> None:

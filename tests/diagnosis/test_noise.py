@@ -8,7 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from common.errors import InputError
-from diagnosis.fits import residuals
+from diagnosis.signals.noise import level
 from diagnosis.signals.noise.rounding import quantum, quantum_between
 from models.registry import Array
 
@@ -93,25 +93,25 @@ def heavy(seed: int, *shape: int) -> Array:
 
 
 def test_tails_that_all_readings_share_count_with_the_level_of_their_noise() -> None:
-    assert residuals.noise(heavy(1, 6000, 3)) == pytest.approx(np.ones(3), abs=0.08)
+    assert level.white_rms(heavy(1, 6000, 3)) == pytest.approx(np.ones(3), abs=0.08)
 
 
 def test_tails_of_some_readings_only_may_be_impacts() -> None:
     normal = np.random.default_rng(2).standard_normal((6000, 1))
-    found = residuals.noise(np.hstack([heavy(3, 6000, 1), normal]))
+    found = level.white_rms(np.hstack([heavy(3, 6000, 1), normal]))
     assert found[0] < 0.9
     assert found[1] == pytest.approx(1.0, abs=0.04)
 
 
 def test_tails_of_a_single_reading_may_be_the_bends_of_its_motion() -> None:
-    assert residuals.tails(np.abs(heavy(4, 6000, 2))) > 1.05
-    assert residuals.tails(np.abs(heavy(4, 6000, 1))) == 1.0
+    assert level.tails(np.abs(heavy(4, 6000, 2))) > 1.05
+    assert level.tails(np.abs(heavy(4, 6000, 1))) == 1.0
 
 
 def test_a_motion_that_grows_has_no_tails() -> None:
     t = np.linspace(0.0, 12.0, 6000)
     motion = (np.exp(0.5 * t) * np.sin(12.0 * t))[:, None]
-    assert residuals.tails(np.abs(np.diff(motion, n=4, axis=0))) == 1.0
+    assert level.tails(np.abs(np.diff(motion, n=4, axis=0))) == 1.0
 
 
 @pytest.mark.parametrize("hidden", [0.06, 0.14, 0.2])
@@ -119,5 +119,5 @@ def test_the_error_of_steps_is_no_louder_than_its_rms(hidden: float) -> None:
     t = np.arange(6000) * 0.002
     motion = 150.0 * np.sin(2.0 * np.pi * 0.4 * t) + np.random.default_rng(3).normal(0.0, hidden, t.size)
     error = np.round(motion) - motion
-    found = residuals.noise(np.stack([error, error], axis=1))
+    found = level.white_rms(np.stack([error, error], axis=1))
     assert found == pytest.approx(np.sqrt(1.0 / 12.0), rel=0.25)

@@ -379,22 +379,6 @@ def test_an_effect_whose_size_lies_at_the_end_of_its_range_explains_in_part_only
     assert judge(limited).outcome == "partly"
 
 
-@pytest.mark.parametrize("name", ["column.yielding", "column.self_centring"])
-def test_a_law_whose_loop_is_least_is_another_one(name: str) -> None:
-    effect = DATA.catalogue[name]
-    loop = next(item for item in effect.every if item.defining)
-    law = next(number for number, one in enumerate(effect.laws) if "loop" in one.shapes) if effect.laws else 0
-    given = {item.name: item.sizes[0] if item.sizes else item.null for item in effect.parameters}
-
-    def with_loop(size: float) -> Fit:
-        values = effect.under(law, given) if effect.laws else effect.values(given)
-        return Fit(DATA, {name: values | {"loop": size}}, np.zeros(0), NOISY)
-
-    assert at_end(with_loop(loop.least)) == (name,)
-    assert at_end(with_loop(2.0 * loop.least)) == ()
-    assert at_end(with_loop(loop.most)) == ()
-
-
 def test_friction_that_turns_round_over_all_speeds_is_a_drag_of_another_law() -> None:
     effect = DATA.catalogue["column.friction"]
     most = next(item.most for item in effect.parameters if item.name == "velocity")

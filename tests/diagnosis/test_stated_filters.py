@@ -23,6 +23,7 @@ from diagnosis.fits.search import search
 from diagnosis.recorded.nuisances import LoggedReadings, through_logger
 from diagnosis.recorded.record import NOT_LATE, Record
 from diagnosis.report.records import Report
+from diagnosis.signals.noise.level import white_rms
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_a, lab_b, unknown, white
 
@@ -100,7 +101,7 @@ def test_noise_is_measured_by_the_frequencies_that_passed(cases: Cases) -> None:
     data = residuals.prepare(lab_b(passed), passed)
     place = data.part.signals.index("damper_force")
     assert data.part.passes[place] == 60.0
-    by_ticks = residuals.noise(data.residual(data.system))[place]
+    by_ticks = white_rms(data.residual(data.system))[place]
     assert data.white[place] > 0.3 * 4.0 * level > 10.0 * by_ticks
 
 

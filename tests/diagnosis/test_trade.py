@@ -131,6 +131,22 @@ def test_of_effects_that_the_data_cannot_tell_apart_one_that_strains_nominal_par
         assert len(found.alternatives) == 1
 
 
+@pytest.mark.parametrize("name", ["column.yielding", "column.self_centring"])
+def test_a_law_whose_loop_is_least_is_another_one(name: str) -> None:
+    effect = DATA.catalogue[name]
+    loop = next(item for item in effect.every if item.defining)
+    law = next(number for number, one in enumerate(effect.laws) if "loop" in one.shapes) if effect.laws else 0
+    given = {item.name: item.sizes[0] if item.sizes else item.null for item in effect.parameters}
+
+    def with_loop(size: float) -> Fit:
+        values = effect.under(law, given) if effect.laws else effect.values(given)
+        return fit({name: values | {"loop": size}})
+
+    assert fitting.at_end(with_loop(loop.least)) == (name,)
+    assert fitting.at_end(with_loop(2.0 * loop.least)) == ()
+    assert fitting.at_end(with_loop(loop.most)) == ()
+
+
 @pytest.mark.parametrize(("ended", "stands"), [(False, "damper.mass"), (True, "sensor.column_force.gain")])
 def test_of_effects_that_the_data_cannot_tell_apart_one_at_the_end_of_its_range_stands_behind(
     ended: bool, stands: str, monkeypatch: pytest.MonkeyPatch

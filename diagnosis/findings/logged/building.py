@@ -16,6 +16,7 @@ from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import LoggedBuilding, logged
 from diagnosis.recorded.parts import Part
 from diagnosis.recorded.record import Record
+from diagnosis.signals.noise import level
 
 # Ratio of the noise in a balance of forces to that of the forces used, from which on a logger caused it.
 # A wrong mass gives a smaller ratio.
@@ -78,6 +79,6 @@ def own_noise(data: Data) -> bool:
     """
     if isinstance(data.part, LoggedBuilding) and data.part.behind:
         return True
-    used = residuals.noise(data.part.measured)
+    used = level.white_rms(data.part.measured)
     least = SMOOTH * np.sqrt(np.mean(np.square(data.part.measured), axis=0))
     return bool(np.any(data.white > np.maximum(OTHERS * used, least)))

@@ -160,7 +160,7 @@ def standard(values: Array) -> Array:
     return np.asarray(apart / np.maximum(apart.std(axis=0), 1e-300))
 
 
-def growing(verdicts: Sequence[PartVerdict]) -> list[str]:
+def told(verdicts: Sequence[PartVerdict]) -> list[str]:
     """A sentence for each reading whose noise grows with it, which counts as no gap."""
     sentences = []
     for verdict in verdicts:

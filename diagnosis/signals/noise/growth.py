@@ -30,7 +30,7 @@ LOUDER = (
 FEWEST = 60  # mean sizes without which it cannot be told
 
 
-class Law(NamedTuple):
+class LevelBySize(NamedTuple):
     """A level that grows with a size: `(still**power + (slope·size)**power)**(1/power)`."""
 
     power: int
@@ -90,25 +90,25 @@ def has_grown(loud: Array, own: Array) -> bool:
     return bool(loud[own >= high].mean() > LOUDER * loud[own <= low].mean())
 
 
-def likeliest(loud: Array, own: Array) -> Law:
+def likeliest(loud: Array, own: Array) -> LevelBySize:
     """The likelier law of mean sizes (n,) over those of a motion (n,)."""
     laws = [fitted(loud, own, power) for power in LAWS]
     return max(laws, key=lambda law: nats(loud, law.level(own), 1.0))
 
 
-def fitted(loud: Array, own: Array, power: int) -> Law:
+def fitted(loud: Array, own: Array, power: int) -> LevelBySize:
     """The law of one power that is likeliest."""
     row = own**power
     least = (FLOOR * float(loud.mean())) ** power
     design = np.column_stack([np.ones_like(row), row])
-    law = Law(
+    law = LevelBySize(
         power, max(least, 0.5 * float(np.mean(loud) ** power)), 0.5 * float(np.mean(loud**power) / row.mean())
     )
     for _ in range(STEPS):
         level = law.level(own)
         slopes = design * (level ** (1 - power) / power / level)[:, None]
         step = np.linalg.lstsq(slopes, loud / level - 1.0, rcond=None)[0]
-        law = Law(power, max(law.still + float(step[0]), least), max(law.slope + float(step[1]), 0.0))
+        law = LevelBySize(power, max(law.still + float(step[0]), least), max(law.slope + float(step[1]), 0.0))
     return law
 
 
