@@ -113,6 +113,7 @@ class ImportedChannel:
     first: float = 0.0  # s after the first tick, of the first of its samples that were interpolated
     average: float = 0.0  # s, up to which each of its samples is a mean
     delay_stated: bool = False  # whether its delay is, which may be none
+    followed: bool = False  # whether it is the plan's own motion between the ticks that its rows showed
 
     @property
     def between(self) -> bool:

@@ -53,9 +53,9 @@ def test_numbers_that_were_logged_slowly_have_no_noise_beyond_half_their_rate(ca
     assert LoggedBuilding(building).passes == pytest.approx([128.0])
 
 
-def with_ground(whole: Record, ground: Array, rate: float) -> Record:
+def with_ground(whole: Record, ground: Array, rate: float, *, followed: bool = True) -> Record:
     """The record as imported, with a ground motion (ticks,) that a logger read at a rate (Hz)."""
-    channel = ImportedChannel(interpolated=True, rate=rate)
+    channel = ImportedChannel(interpolated=True, rate=rate, followed=followed)
     stated = ImportedData("", channels={MASTER: {"ground_acceleration": channel}})
     run = replace(whole.run, metadata=whole.run.metadata | {IMPORT: stated.metadata()})
     return replace(whole, run=run, signals=whole.signals | {"ground_acceleration": ground})
@@ -76,7 +76,7 @@ def test_a_ground_motion_between_the_ticks_of_a_slow_logger_is_as_the_motion_is_
 
     ground = whole.signals["ground_acceleration"]
     read = ground if followed else between(ground)
-    here = Building(with_ground(whole, read, rate)).ground
+    here = Building(with_ground(whole, read, rate, followed=followed)).ground
     assert here == pytest.approx(between(ground), abs=1e-6 * float(np.std(ground)))
     assert np.std(here - ground) > 1e-4 * np.std(ground)
 

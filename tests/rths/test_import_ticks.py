@@ -84,6 +84,10 @@ def test_the_ground_motion_tells_the_ticks_of_a_slower_logger(bring: Any, tmp_pa
     assert (
         np.max(np.abs(found["ground_acceleration"] - ground[: found["t"].size])) < 1e-5
     )  # a cubic misses the corner
+    followed = {
+        name: known(run).channel("master", name).followed for name in ("ground_acceleration", "displacement")
+    }
+    assert followed == {"ground_acceleration": True, "displacement": False}
     assert known(run).channel("master", "displacement").interpolated
 
 

@@ -90,11 +90,15 @@ class TickGrid(NamedTuple):
         apart = not stands_on(times, places, self.interval)
         return (moved(times, values, places, row) if apart else values[nearest_rows(times, places)]), apart
 
+    def follows(self, known: Array | None) -> bool:
+        """Whether a channel is what it should be between the ticks that a controller's rows showed."""
+        return self.clock is not None and known is not None and known.size >= self.t.size
+
     def between(self, when: Array, values: Array, row: Signal, known: Array | None) -> Array:
         """What a channel has at all ticks by its values (m,) at some of them, at `when` (m,), s."""
         if when.size == self.t.size and np.max(np.abs(when - self.t)) < ON_TICKS * self.interval:
             return values
-        if known is None or known.size < self.t.size:
+        if known is None or not self.follows(known):
             return moved(when, values, self.t, row)
         there = known[np.clip(np.rint(when / self.interval).astype(int), 0, self.t.size - 1)]
         return known[: self.t.size] + moved(when, values - there, self.t, row)
@@ -156,7 +160,8 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
         begin_, fast = (clock.begin, clock.fast) if clock else (0.0, 0.0)
         own_rate = (1.0 + fast) * (rate if own.all() else rate_of(times))
         first = 0.0 if mapping.static else (float(times[0]) - begin_) / (1.0 + fast)
-        found.stated[name] = channel(source, row, own_rate, first, between=apart)
+        followed = apart and name in computed and ticks.follows(should)
+        found.stated[name] = channel(source, row, own_rate, first, between=apart, followed=followed)
     return found
 
 
@@ -343,7 +348,7 @@ def scale_of(name: str, source: SignalSource, row: Signal, table: DataTable, dat
 
 
 def channel(
-    source: SignalSource, row: Signal, rate: float, first: float, *, between: bool
+    source: SignalSource, row: Signal, rate: float, first: float, *, between: bool, followed: bool
 ) -> ImportedChannel:
     """The stated properties of the channel of a measured signal; `rate` (Hz) and `first` (s) are by the controller."""
     counted = row.kind is FieldType.INDEX
@@ -358,4 +363,5 @@ def channel(
         first=first if between and not counted else 0.0,
         average=source.average,
         delay_stated=source.delay_stated,
+        followed=followed,
     )
