@@ -181,12 +181,17 @@ def forces(model: str, parameters: Mapping[str, float], path: Array) -> Array:
 
 
 def fit(
-    model: str, deformation: Array, force: Array, start: Mapping[str, float] | None = None
+    model: str,
+    deformation: Array,
+    force: Array,
+    start: Mapping[str, float] | None = None,
+    used: NDArray[np.bool_] | None = None,
 ) -> SpecimenFit:
     """Parameters of `model` with which it follows a path of deformation (m) and force (N) from rest.
 
     `start` holds parameters by name, from which the fit starts instead of the fixed points; a parameter that it lacks
-    has the value of the first fixed point.
+    has the value of the first fixed point. Where rows (n,) are `used`, only the forces of these are fitted, along the
+    whole path: a law remembers where it has been, so that rows cannot be cut out of it.
 
     Raises:
         InputError: the model or a parameter is unknown, or the record cannot be fitted.
@@ -197,21 +202,25 @@ def fit(
         if name not in fields:
             raise InputError(f"Unknown parameter '{name}' of model '{model}': {nearest(name, fields)}")
     ranges = FREE[model]
-    scale = scales(path, measured)
+    there = np.ones(path.size, dtype=bool) if used is None else used
+    scale = scales(path[there], measured[there])
     units = np.array([scale[item.unit] for item in ranges.values()])
     low, high = bounds(ranges)
     kept = thinned(path, MOST_ROWS)
-    rms = math.sqrt(float(np.mean(measured**2)))
+    if not there.all():
+        kept = np.union1d(kept, np.flatnonzero(there)[thinned(path[there], MOST_ROWS)])
+    rms = math.sqrt(float(np.mean(measured[there] ** 2)))
 
     def misfit(x: Array) -> Array:
-        return (forces(model, parameters(model, x, units), path[kept]) - measured[kept]) / rms
+        found = (forces(model, parameters(model, x, units), path[kept]) - measured[kept]) / rms
+        return np.asarray(found[there[kept]])
 
     trials = [np.clip(x, low, high) for x in starting_points(model, units, start)]
     ranked = sorted(trials, key=lambda x: float(np.sum(misfit(x) ** 2)))
     chosen = ranked[: max(2, FOLLOWED // len(ranges) ** 2)]
     best = followed(misfit, chosen, low, high)
     values = parameters(model, best.x, units)
-    gap = forces(model, values, path) - measured
+    gap = (forces(model, values, path) - measured)[there]
     return SpecimenFit(
         model,
         values,

@@ -156,14 +156,15 @@ def named(part: str, role: str) -> dict[str, str]:
 
 def fitted(recording: Any, model: str, most: float) -> dict[str, Any]:
     """A hysteretic model fitted to the column's force in rows where that is at most as large, N."""
-    from report.facts.force_range import fitted_within, said, within
+    from models.specimens.fit import fit
+    from report.facts.force_range import said, within
 
     columns = recording.columns.get("master", {})
     if not {"column_displacement", "column_force"} <= columns.keys():
         raise InputError(f"{recording.path} has no column_displacement and column_force to fit '{model}' to.")
     force = columns["column_force"]
     used = within(recording, force, most)
-    found = fitted_within(model, columns["column_displacement"], force, used)
+    found = fit(model, columns["column_displacement"], force, used=used)
     parameters = {
         name: {"value": value} | determined(*found.intervals[name]) | {"unit": unit_of(name)}
         for name, value in found.parameters.items()
