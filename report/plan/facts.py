@@ -25,6 +25,7 @@ from models.ground_motion import GroundMotion
 from models.structures import shear_building
 from recorder import space
 from report.plan import classes, slips
+from report.plan.named_test import of_test
 
 
 def facts(plan: Plan, file: Path) -> dict[str, Any]:
@@ -37,12 +38,7 @@ def facts(plan: Plan, file: Path) -> dict[str, Any]:
     refusing = [one["risk"] for one in rigs_there if one["risk"]]
     made = [*found.checks, *built, space.check(plan, existing(Path(plan.recording.folder)))]
     return {
-        "plan": str(file),
-        "digest": plan.digest(),
-        "test": plan.test.name,
-        "duration": plan.test.duration,
-        "interval": plan.test.interval,
-        "ticks": plan.ticks,
+        **of_test(plan, file),
         "ground_motion": ground(plan, motion),
         "structure": structure(plan) | {"model": built[0].text if built else ""},
         "transfer_systems": transfer_systems(plan),

@@ -13,11 +13,10 @@ from common.plan.plan import Plan
 from common.plan.schema import plain, table_fields
 from laboratories.kinds import kinds_of
 from report.plan import classes, slips
+from report.plan.named_test import of_test
 
-BUILDING = (
-    "structure",
-    "ground_motion",
-)  # tables of a test, without which a plan has those of the default test
+# Tables of a test, without which a plan has those of the default test.
+BUILDING = ("structure", "ground_motion")
 
 
 def by_itself(plan: Plan, stated: Collection[str]) -> bool:
@@ -43,12 +42,7 @@ def facts(plan: Plan, file: Path, given: Mapping[str, Any]) -> dict[str, Any]:
     kind = known_kind(next(iter(plan.kinds.values())))
     tables = [name for name in (*TABLES_OF_KIND[kind], "sensors") if name in given]
     return {
-        "plan": str(file),
-        "digest": plan.digest(),
-        "test": plan.test.name,
-        "duration": plan.test.duration,
-        "interval": plan.test.interval,
-        "ticks": plan.ticks,
+        **of_test(plan, file),
         "machine": {name: stated(getattr(plan, name), given[name]) for name in tables},
         "ground_motion": None,
         "structure": None,

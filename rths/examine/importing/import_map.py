@@ -107,7 +107,7 @@ FORM = (
     "decimal",
     "thousands",
     "skip_rows",
-)  # keys of a text file, recognised where they are left out
+)  # of a text file, recognised where they are left out
 OUR_OWN = ("scaled", "delay_stated")  # fields that are set here and cannot be given as keys
 
 
