@@ -46,7 +46,8 @@ def test_the_planned_parameters_are_identified_from_the_bench_recording(
     topic = "master" if part in ("column", "actuator") else "slave"
     assert run.sequences[topic].tolist() == list(range(summary["ticks"]))
     assert call("identify", path, "--json") == 0
-    (report,) = json.loads(capsys.readouterr().out)["parts"]
+    report, *laws = json.loads(capsys.readouterr().out)["parts"]
+    assert [law["part"] for law in laws] == ["column, model linear"] * (part == "column")
     for name, (value, share) in NOMINAL[part].items():
         found = report["parameters"][name]
         assert found["value"] == pytest.approx(value, rel=share), name
