@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 from diagnosis.diagnose import diagnose
+from diagnosis.fits import evidence, fitting, residuals
+from diagnosis.fits.noise.growing_noise import evened
 from diagnosis.fits.noise.inputs import motions
+from diagnosis.fits.noise.remainder import remainder
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise.growth import growing
 from models.registry import Array
-from tests.diagnosis.cases import Cases
+from tests.diagnosis.cases import Cases, lab_b
 
 TICKS = 6000
 INTERVAL = 2e-3
@@ -92,6 +95,34 @@ def grown(whole: Record, name: str) -> Record:
     read = whole.signals[name]
     made = loudness(read - read[0]) * np.random.default_rng(12).normal(size=read.size)
     return replace(whole, signals=whole.signals | {name: read + 1.5 * whole.planned_noise[name] * made})
+
+
+def test_residuals_are_measured_by_the_noise_of_every_tick(cases: Cases) -> None:
+    whole = cases.record(duration=12.0)
+    loud = grown(whole, "damper_force")
+    part = lab_b(loud)
+    place = part.signals.index("damper_force")
+    given = residuals.prepare(part, loud)
+    data, even = evened(given, remainder(given, given.system), given.system)
+    assert data.loudness is not None
+    assert np.all(np.delete(data.loudness, place, axis=1) == 1.0)
+    true = 1.5 * whole.planned_noise["damper_force"]  # beside the noise that it had, which does not grow
+    rms = np.hypot(true, whole.planned_noise["damper_force"])
+    assert data.white[place] == pytest.approx(rms, rel=0.05)
+    assert given.white[place] < 0.93 * rms  # by medians of noise that comes and goes
+    level = np.mean(
+        np.square(data.loudness[: len(even.noise) * data.group, place].reshape(-1, data.group)), axis=1
+    )
+    calm, restless = level < np.quantile(level, 0.4), level > np.quantile(level, 0.8)
+    before, after = (item.reduced(item.system)[:, place] for item in (given, data))
+    assert before[restless].std() > 1.5 * before[calm].std()
+    assert after[restless].std() == pytest.approx(after[calm].std(), rel=0.15)
+    bare = replace(data, loudness=None)
+    apart = evidence.surprise(fitting.at(data, {}, np.zeros(len(part.nuisances)))) - evidence.surprise(
+        fitting.at(bare, {}, np.zeros(len(part.nuisances)))
+    )
+    energy = np.sum(after**2) - np.sum(bare.reduced(bare.system)[:, place] ** 2)
+    assert apart == pytest.approx(energy + np.sum(np.log(level)), rel=1e-6)
 
 
 @pytest.mark.long

@@ -160,7 +160,7 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
         begin_, fast = (clock.begin, clock.fast) if clock else (0.0, 0.0)
         own_rate = (1.0 + fast) * (rate if own.all() else rate_of(times))
         first = 0.0 if mapping.static else (float(times[0]) - begin_) / (1.0 + fast)
-        followed = apart and name in computed and ticks.follows(should)
+        followed = apart and ticks.follows(should)
         found.stated[name] = channel(source, row, own_rate, first, between=apart, followed=followed)
     return found
 
