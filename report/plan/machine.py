@@ -12,6 +12,7 @@ from common.plan.kinds import OWN, TABLES_OF_KIND, known_kind
 from common.plan.plan import Plan
 from common.plan.schema import plain, table_fields
 from laboratories.kinds import kinds_of
+from models.specimens import SPECIMENS
 from report.plan import classes, slips
 from report.plan.named_test import of_test
 
@@ -67,6 +68,8 @@ def stated(table: Any, given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         for field in table_fields(table)
         if "rule" in field.metadata and not field.metadata.get("more")
     }
+    if (law := SPECIMENS.get(getattr(table, "model", ""))) is not None:
+        units |= {name: rule.unit for name, rule in law.rules.items()}
     found: dict[str, dict[str, Any]] = {}
     for name, value in plain(table).items():
         if name not in given:

@@ -50,6 +50,13 @@ def test_check_shows_what_the_plan_states_of_the_machine(call: Any, capsys: Any,
     }
 
 
+def test_values_of_a_law_have_its_units(call: Any, capsys: Any, tmp_path: Path) -> None:
+    law = '[column]\nmodel = "bilinear"\nstiffness = 1e6\nyield_displacement = "3 mm"\nhardening = 0.1\n'
+    code, _, said = checked(call, capsys, tmp_path, f'[test]\nname = "c"\n[slave]\nkind = "none"\n{law}')
+    assert code == 0
+    assert "model bilinear, stiffness 1e+06 N/m, yield_displacement 0.003 m, hardening 0.1\n" in said
+
+
 def test_check_describes_its_test_where_that_is_asked_for(call: Any, capsys: Any, tmp_path: Path) -> None:
     code, facts, said = checked(call, capsys, tmp_path, ALONE, "--building")
     assert code == (0 if facts["ready"] else 1)
