@@ -70,7 +70,7 @@ class Data:
     # (groups, signals) times the noise that an averaged sample behind an impact is known to; None where none is
     vague: Array | None = None
     resting: Array | None = None  # the same beside a coarse step on which a reading rests
-    loudness: Array | None = None  # (ticks, signals) of noise that grows with the reading, over its rms
+    loudness: Array | None = None  # (ticks, signals) of unsteady noise over its rms
     erring: float = MODEL_ERROR  # share of a reading's rms that a good solution of the model may err by
     static: bool = False  # whether its rows have no times
 
@@ -129,7 +129,7 @@ class Data:
             result[self.missing] = 0.0
         return result
 
-    def white_part(self, residual: Array) -> Array:
+    def white_part(self, residual: Array, *, uneven: bool = False) -> Array:
         """Rms (signals,) of the white part of residuals (ticks, signals), of the frequencies that a logger passed.
 
         Its filter cuts off the noise that came through it, and what it left above tells nothing of that. So as many
@@ -139,7 +139,7 @@ class Data:
         for size in np.unique(together):
             some = residual[: len(residual) // size * size, together == size]
             sums = some.reshape(-1, size, some.shape[1]).sum(axis=1) / math.sqrt(size)
-            result[together == size] = white_rms(sums)
+            result[together == size] = white_rms(sums, uneven=uneven)
         return result
 
     def together(self, ticks: int) -> NDArray[np.int64]:
@@ -235,7 +235,7 @@ class Data:
 
     @cached_property
     def louder(self) -> Array | None:
-        """Rms noise (groups, signals) of averaged samples over that of the record, where any grows with its reading."""
+        """Rms noise (groups, signals) of averaged samples over that of the record, where any is unsteady."""
         if self.loudness is None:
             return None
         return np.asarray(np.sqrt(self.averaged(self.loudness**2) / math.sqrt(self.group)))

@@ -82,7 +82,7 @@ def shifted(after: Data, before: Data) -> bool:
 
 def under_white(fit: Fit, data: Data, before: Data) -> Fit:
     """The fit under white noise: that of `before` where it is no lower."""
-    changed = bool(before.noise) or data.lines is not None or data.spikes is not None
+    changed = bool(before.noise) or sensor_noise.altered(data)
     data = (
         data
         if changed or quieter(data, before)

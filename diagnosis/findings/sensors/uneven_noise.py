@@ -22,8 +22,8 @@ from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.noise import inputs
-from diagnosis.fits.noise.growing_noise import evened
 from diagnosis.fits.noise.remainder import remainder
+from diagnosis.fits.noise.unsteady_noise import by_reading, evened
 from diagnosis.fits.unexplained import BOTH
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.parts import LaboratoryPart
@@ -161,20 +161,27 @@ def standard(values: Array) -> Array:
 
 
 def told(verdicts: Sequence[PartVerdict]) -> list[str]:
-    """A sentence for each reading whose noise grows with it, which counts as no gap."""
+    """A sentence for each reading whose noise grows with it or comes in bursts, which counts as no gap."""
+    return [line for verdict in verdicts for line in unsteady_in(verdict.search.chosen)]
+
+
+def unsteady_in(fit: Fit) -> list[str]:
+    """The same for the readings of a part."""
+    data, system = fit.data, hypothesis.lay(fit.data, fit.z, fit.values)
     sentences = []
-    for verdict in verdicts:
-        fit = verdict.search.chosen
-        system = hypothesis.lay(fit.data, fit.z, fit.values)
-        data = evened(fit.data, remainder(fit.data, system), system)[0]
-        if data.loudness is not None:
-            times = data.loudness.max(axis=0) / data.loudness.min(axis=0)
-            sentences += [
-                f"The noise of {signal} grows with its reading, to {much:.2g} times as much at the largest, and counts "
-                "as no gap."
-                for signal, much in zip(data.part.signals, times, strict=True)
-                if much > 1.0
-            ]
+    found = by_reading(data, remainder(data, system).single, system)
+    for signal, one in zip(data.part.signals, found, strict=True):
+        if one is None:
+            continue
+        times = float(one.loudness.max() / one.loudness.min())
+        if one.why == "grows":
+            text = f"grows with its reading, to {times:.2g} times as much at the largest"
+        else:
+            loudest = float(np.argmax(one.loudness)) * data.system.plan.test.interval
+            text = (
+                f"comes in bursts of up to {times:.2g} times its usual level, the loudest at {loudest:.1f} s"
+            )
+        sentences.append(f"The noise of {signal} {text}, and counts as no gap.")
     return sentences
 
 

@@ -21,7 +21,7 @@ def inputs(part: Part, system: System) -> Array:
     """What a part's residuals may depend on, (ticks, inputs): its commands and its readings as predicted.
 
     Targets stand in for the commands of transfer systems: these hold noise that a controller fed back. A
-    building's own motion stands in for what is predicted from the noise of the forces.
+    building's own motion, without the noise of forces in it, stands in for what is predicted from that noise.
     """
     columns = dependencies(part, system)
     return columns[:, np.ptp(columns, axis=0) > 0.0]
@@ -32,7 +32,7 @@ def dependencies(part: Part, system: System) -> Array:
     if isinstance(part, JoinedPart):
         return np.concatenate([dependencies(piece, system) for piece in part.pieces])
     if isinstance(part, LoggedBuilding):
-        return np.column_stack([part.ground, part.motion])
+        return np.column_stack([part.ground, part.smooth])
     if isinstance(part, LaboratoryPart):
         columns = list(part.wanted.values())
         part = part.replaced(inputs=part.inputs | part.wanted)

@@ -17,9 +17,9 @@ import numpy as np
 
 from diagnosis.fits import hypothesis, residuals
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.noise.growing_noise import evened
 from diagnosis.fits.noise.inputs import inputs, related
 from diagnosis.fits.noise.remainder import Remainder, remainder, spans
+from diagnosis.fits.noise.unsteady_noise import evened
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.mask import Mask
@@ -89,8 +89,8 @@ def coloured(data: Data) -> bool:
 
 
 def altered(data: Data) -> bool:
-    """Whether readings hold more than white noise: noise of a colour, lines or spikes."""
-    return coloured(data) or data.lines is not None or data.spikes is not None
+    """Whether readings hold more than steady white noise: noise of a colour, unsteady noise, lines or spikes."""
+    return coloured(data) or any(known is not None for known in (data.loudness, data.lines, data.spikes))
 
 
 def whitened(fit: Fit) -> Data:

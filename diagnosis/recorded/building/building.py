@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from common.recording.imported import ImportedData
 from common.roles import MASTER
+from diagnosis.recorded.building import motion
+from diagnosis.recorded.building.motion import GROUND, MOTION
 from diagnosis.recorded.nuisances import of_building
 from diagnosis.recorded.parts import Measured, of_sites
 from diagnosis.recorded.record import Record
@@ -16,40 +17,6 @@ from laboratories.kinds import kind_of
 from loop import replay
 from models.registry import Array
 from models.system import System
-
-MOTION = ("displacement", "velocity", "acceleration")
-GROUND = "ground_acceleration"
-# Rows in an interval, below which they pass over ticks that count. Of faster rows near the ticks the times hardly tell
-# which ticks they showed, and nearly all were.
-SLOWER = 0.9
-
-
-def differences(displacement: Array, interval: float) -> dict[str, Array]:
-    """Displacements (ticks, storeys), and velocities and accelerations by central differences.
-
-    These are the explicit Newmark method's own; others differ from them by the share (ω·interval)²/12.
-    """
-    velocity = np.gradient(displacement, interval, axis=0)
-    bends = np.diff(displacement, 2, axis=0) / interval**2
-    return {
-        "displacement": displacement,
-        "velocity": velocity,
-        "acceleration": np.pad(bends, ((1, 1), (0, 0)), mode="edge"),
-    }
-
-
-def ground_as_motion(record: Record) -> Array:
-    """The recorded ground acceleration (ticks,), between the ticks that rows showed as the motion is there.
-
-    An import follows the plan's ground motion between these, and has all other numbers of the master by a cubic spline.
-    Equations of motion hold of what they all are by one.
-    """
-    values, interval = record.signals[GROUND], record.plan.test.interval
-    channel = (record.stated or ImportedData("")).channel(MASTER, GROUND)
-    if not channel.followed or channel.rate * interval >= SLOWER:
-        return values
-    seen = channel.seen(record.ticks, interval)
-    return np.asarray(CubicSpline(seen, values[seen])(np.arange(record.ticks)))
 
 
 class Building(Measured):
@@ -84,14 +51,13 @@ class Building(Measured):
         self._interval = record.plan.test.interval
         self._recorded = tuple(name for name in MOTION if record.has(name))
         self._ground = np.zeros((2, record.ticks + 1))
-        self._ground[0, :-1] = ground_as_motion(record)
+        self._ground[0, :-1] = motion.of_ground(record)
         storeys = plan.storeys
         self.signals = tuple(name for name in self._recorded for _ in range(storeys))
         rows = {name: record.signals[name].reshape(record.ticks, -1) for name in self._recorded}
         self.measured = np.hstack([*rows.values()])
         self.present = np.repeat(record.present["displacement"][:, None], self.measured.shape[1], axis=1)
-        by_differences = differences(rows["displacement"], self._interval)
-        self.motion = np.hstack([rows.get(name, by_differences[name]) for name in MOTION])
+        self.motion = np.hstack([*motion.of_storeys(record, rows).values()])
         stated = record.stated or ImportedData("")
         known = [name if name in rows else "displacement" for name in MOTION for _ in range(storeys)]
         seen = (*known, GROUND, self._force, *came)  # motion, ground and forces

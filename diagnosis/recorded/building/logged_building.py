@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from scipy import ndimage
 
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.nuisances import ALIKE, CALIBRATED, LATE, UNLIKE, LoggedForce
@@ -22,9 +23,13 @@ from models.system import System
 BALANCE = "force_balance"  # signal of a building that is judged by the balance of its forces, N
 PER_PERIOD = 12  # averages in the shortest period, of which noise is told from the motion
 FEWEST = 50  # of averages at least, by which noise is known
+SMOOTHED = (
+    0.125  # of the shortest period, by which motions are averaged that tell what noise of forces is not
+)
 STEADY = 0.3  # of the noise of a force, by which its zero may be off and drift to either side, unseen
 BEFORE = 0.75  # share of what stated filters change, from which on they lie before the master
 SURE = 3.0  # standard deviations from which on a stated filter is taken to lie before the master
+SLOPES = 2  # ticks to either side that the slopes and bends of a displacement take in
 
 
 def logged(building: Building) -> LoggedBuilding:
@@ -37,11 +42,12 @@ def logged(building: Building) -> LoggedBuilding:
     if not (building.linear and building.treated):
         return plain
     behind = LoggedBuilding(building, behind=True)
-    return plain if before_master(plain.left(), behind.left()) else behind
+    rows = slice(None, None, plain.row)
+    return plain if before_master(plain.left()[rows], behind.left()[rows]) else behind
 
 
 def before_master(plain: Array, behind: Array) -> bool:
-    """Whether stated filters lie before the master, from what is left (ticks, storeys) with and without them.
+    """Whether stated filters lie before the master, from what is left (rows, storeys) without and with them.
 
     If so, the second is the first, plus what the filters change, which is known; else it has nothing of that change, or
     half of it, where a delay brings the noise of the motion at another time in its place. Fourth differences keep what
@@ -87,7 +93,8 @@ class LoggedBuilding(Building):
         plan = self._plan
         self.signals = (BALANCE,) * plan.storeys
         self.measured = self.balance(System(plan), self.motion)
-        self.present = of.present[:, : plan.storeys]
+        there = of.present[:, : plan.storeys]
+        self.present = ndimage.binary_erosion(there, np.ones((2 * SLOPES + 1, 1)), border_value=1)
         self.about = 0.0 if of.linear else self._stated.late
         late = ALIKE if behind else max(ALIKE, UNLIKE * self.about) if self.about else LATE
         zero = STEADY * self._noise
@@ -186,9 +193,25 @@ class LoggedBuilding(Building):
         return np.full(len(self.signals), min(one.passes for one in several))
 
     @property
+    def row(self) -> int:
+        """Ticks from one row of the motion to the next."""
+        rate = self.channels[0].rate if self.channels[0].interpolated else 0.0
+        return max(1, round(1.0 / (rate * self._interval))) if rate > 0.0 else 1
+
+    @property
     def shortest(self) -> float:
         """The shortest natural period of the planned building, s."""
         return float(np.min(shear_building.modes(*partition.matrices(self._plan)).periods))
+
+    @property
+    def smooth(self) -> Array:
+        """The motion without most of the noise of the forces that the controller read, shape as `motion`.
+
+        It is averaged with normal weights, which leave three natural frequencies of the stiffest mode 6 % of a wave.
+        """
+        return np.asarray(
+            ndimage.gaussian_filter1d(self.motion, SMOOTHED * self.shortest / self._interval, axis=0)
+        )
 
     def balance(self, system: System, motion: Array) -> Array:
         """M·ẍ + C·ẋ + K·x of the numerical part, (ticks, storeys) N, for displacement, velocity and acceleration."""
@@ -204,7 +227,7 @@ class LoggedBuilding(Building):
         mass as well, which the reading has not. So the parameters that leave least are those that explain most.
         """
         delay, gain = self.logger(system)
-        apart = self.balance(system, self.motion - self.computed(system))
+        apart = np.where(self.present, self.balance(system, self.motion - self.computed(system)), 0.0)
         masses = [float(np.trace(partition.numerical(plan)[0])) for plan in (system.plan, self._plan)]
         louder = gain * masses[0] / masses[1]
         over = math.sqrt(1.0 + self.of_motion * (louder**2 - 1.0))

@@ -1,0 +1,77 @@
+"""Noise of a part's sensors that is not as loud at all times: it grows with what they read, or comes in bursts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from diagnosis.fits import residuals
+from diagnosis.fits.noise.inputs import inputs, motions
+from diagnosis.fits.noise.remainder import Remainder, spans
+from diagnosis.fits.residuals import Data
+from diagnosis.recorded.building.logged_building import LoggedBuilding
+from diagnosis.recorded.column_alone import ColumnAlone
+from diagnosis.recorded.joined import JoinedPart
+from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.signals.noise.bursts import bursting
+from diagnosis.signals.noise.growth import growing
+from models.registry import Array
+from models.system import System
+
+Why = Literal["grows", "bursts"]
+
+# Steps of a reading over its noise from which on its highest frequencies are those of the steps.
+STEPS = 0.5
+
+
+class Unsteady(NamedTuple):
+    """How loud the noise of one reading is at every tick."""
+
+    loudness: Array  # (ticks,) with a mean square of one
+    why: Why
+
+
+def evened(data: Data, rest: Remainder, system: System) -> tuple[Data, Remainder]:
+    """The data with how loud unsteady noise is, and the remainder as if that noise were steady."""
+    data = replace(data, loudness=None)
+    found = by_reading(data, rest.single, system)
+    unsteady = [place for place, one in enumerate(found) if one is not None]
+    if not unsteady:
+        return data, rest
+    steady = np.ones(len(data.part.measured))
+    loudness = np.column_stack([steady if one is None else one.loudness for one in found])
+    single = rest.single / loudness[: len(rest.single)]
+    data = replace(data, loudness=loudness)
+    noise = rest.noise if data.louder is None else rest.noise / data.louder
+    even = rest._replace(noise=noise, single=single)
+    white = data.white.copy()
+    white[unsteady] = data.white_part(single, uneven=True)[unsteady]
+    return residuals.measured_by(data, white), even
+
+
+def by_reading(data: Data, single: Array, system: System) -> list[Unsteady | None]:
+    """How loud the noise (ticks, signals) of each reading is; None where it is steady."""
+    first = data.part.pieces[0] if isinstance(data.part, JoinedPart) else data.part
+    if data.static or not isinstance(first, LaboratoryPart | ColumnAlone | LoggedBuilding):
+        return [None] * single.shape[1]
+    said = np.nan_to_num(data.part.predict(system))
+    begun = np.concatenate([said[span] - said[span][0] for span in spans(data.part)])
+    others = motions(np.column_stack([inputs(data.part, system), begun]))
+    sizes, interval = data.together(len(single)), data.system.plan.test.interval
+    result: list[Unsteady | None] = []
+    for place, one in enumerate(single.T):
+        size, found = int(sizes[place]), None
+        if data.live[place]:
+            if not isinstance(first, LoggedBuilding):
+                found = unsteady(growing(one, begun[:, place], others, size), "grows")
+            if found is None and data.rounded[place] <= STEPS * data.white[place]:
+                found = unsteady(bursting(one, others, size, interval), "bursts")
+        result.append(found)
+    return result
+
+
+def unsteady(loudness: Array | None, why: Why) -> Unsteady | None:
+    """Noise of a loudness (ticks,), None where it is steady."""
+    return None if loudness is None else Unsteady(loudness, why)
