@@ -62,7 +62,7 @@ def uneven(fit: Fit) -> list[Uneven]:
     data, rest = evened(fit.data, remainder(fit.data, system), system)
     single = rest.single
     moving = inputs.inputs(data.part, system)[: len(single)]
-    motions = [amplitudes(moving, size) for size in SCALES]
+    motions = [amplitudes(moving, size, bends=not data.between) for size in SCALES]
     said = np.nan_to_num(data.part.predict(system))[: len(single)]
     erring = BOTH * data.erring
     return [
@@ -111,9 +111,12 @@ def differences(values: Array, size: int) -> Array:
     return np.asarray((means[:, 1] - means[:, 0]) * math.sqrt(0.5 * size))
 
 
-def amplitudes(moving: Array, size: int) -> Array:
-    """Rms (differences, columns) of each input, of its slope and of its bend, of those that change."""
-    columns = np.square(inputs.motions(moving))
+def amplitudes(moving: Array, size: int, *, bends: bool = True) -> Array:
+    """Rms (differences, columns) of each input, of its slope and, where asked for, of its bend, of those that change.
+
+    What a reading does between the ticks, as a command's steps make a machine do, looks like noise that follows bends.
+    """
+    columns = np.square(inputs.motions(moving))[:, : (3 if bends else 2) * moving.shape[1]]
     count = len(columns) // (2 * size)
     rms = np.sqrt(columns[: 2 * size * count].reshape(count, 2 * size, -1).mean(axis=1))
     return np.asarray(rms[:, np.ptp(rms, axis=0) > 0.0])
