@@ -46,6 +46,11 @@ class AlikeReadings(NamedTuple):
     names: tuple[str, ...]  # of its channels
     spectra: ReadSpectra
 
+    @property
+    def misses(self) -> float:
+        """Largest share of a reading's rms that the nominal model leaves without a filter."""
+        return low_pass.missed(self.spectra, NOTHING_STATED)
+
     def gain(self, channel: ImportedChannel) -> float:
         """By how much less surprising they are behind a filter than with nothing."""
         nothing, behind = (low_pass.surprise(self.spectra, one) for one in (NOTHING_STATED, channel))
@@ -201,18 +206,12 @@ def of_forces(labs: Sequence[AlikeReadings], exact: Sequence[AlikeReadings]) -> 
 def followed(known: Common, found: Common, labs: Sequence[AlikeReadings]) -> Common:
     """The filter `found` of a group of readings; where there is none that `known` of the other group, as likely.
 
-    It is so where one laboratory's readings say the same by themselves. Another laboratory speaks against it only if
-    its nominal model fits, as an effect may make its readings come earlier by as much.
+    It is so where one laboratory's readings say the same by themselves.
     """
     if found.channel.late > 0.0 or known.channel.late == 0.0:
         return found
     agreeing = any(one.allows(known.channel) for one in likely(labs))
-    against = [
-        one
-        for one in labs
-        if one.gain(known.channel) < -BEYOND and low_pass.missed(one.spectra, NOTHING_STATED) < SPOILT
-    ]
-    return Common(known.channel, tuple(labs)) if agreeing and not against else found
+    return passed(labs, known.channel) if agreeing else found
 
 
 def alike(*groups: Common) -> tuple[Common, ...]:
@@ -266,10 +265,12 @@ def in_common(labs: Sequence[AlikeReadings], sure: Sequence[LikelyFilter]) -> Co
 
 
 def passed(labs: Sequence[AlikeReadings], channel: ImportedChannel) -> Common:
-    """A filter or delay that readings of laboratories passed; nothing where one's are much less likely behind it."""
-    if any(one.gain(channel) < -BEYOND for one in labs) or not labs:
-        return Common()
-    return Common(channel, tuple(labs))
+    """A filter or delay that readings of laboratories passed; nothing where one's are much less likely behind it.
+
+    Those that the nominal model misses by far say nothing against it: an effect may make them come earlier by as much.
+    """
+    against = (one.gain(channel) < -BEYOND and one.misses < SPOILT for one in labs)
+    return Common(channel, tuple(labs)) if labs and not any(against) else Common()
 
 
 def by_channel(*found: Common) -> dict[tuple[str, str], LoggerFilter]:
