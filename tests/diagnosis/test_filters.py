@@ -193,6 +193,18 @@ def test_other_readings_are_as_late_as_forces_unless_one_that_fits_speaks_agains
 
 
 @pytest.mark.usefixtures("weighed")
+@pytest.mark.parametrize(("missed", "there"), [(0.06, True), (0.04, False)], ids=["effect", "fits"])
+def test_a_laboratory_that_its_model_misses_says_nothing_against_a_filter_of_all(
+    missed: float, there: bool
+) -> None:
+    labs = readings(Wanted(1.0, 100.0), Wanted(0.1, 200.0, missed=missed))
+    found = filters.passed(labs, ImportedChannel(delay=LATE))
+    assert (found.channel.delay == LATE) == there
+    assert len(found.by) == (2 if there else 0)
+    assert filters.passed([], ImportedChannel(delay=LATE)) == filters.Common()
+
+
+@pytest.mark.usefixtures("weighed")
 @pytest.mark.parametrize(
     ("master", "sure", "said"),
     [(Wanted(1.0, 50.0), 100.0, 1.0), (Wanted(1.3, 5000.0), 100.0, 1.3), (Wanted(1.3, 5000.0), 500.0, 1.3)],

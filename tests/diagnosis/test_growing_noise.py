@@ -9,9 +9,9 @@ import pytest
 
 from diagnosis.diagnose import diagnose
 from diagnosis.fits import evidence, fitting, residuals
-from diagnosis.fits.noise.unsteady_noise import evened
 from diagnosis.fits.noise.inputs import motions
 from diagnosis.fits.noise.remainder import remainder
+from diagnosis.fits.noise.unsteady_noise import evened
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise.growth import growing
 from models.registry import Array

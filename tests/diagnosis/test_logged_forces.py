@@ -13,10 +13,12 @@ from common.roles import MASTER
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.unexplained import leaves
 from diagnosis.recorded.building import logged_building
+from diagnosis.recorded.building import motion as recorded_motion
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.recorded.record import Record
 from models.registry import Array
+from models.system import System
 from tests.diagnosis.cases import Cases
 
 
@@ -86,3 +88,118 @@ def test_a_ground_motion_that_a_logger_read_at_nearly_every_tick_stays(rate: flo
     whole = cases.record()
     ground = whole.signals["ground_acceleration"]
     assert np.all(Building(with_ground(whole, ground, rate)).ground == ground)
+
+
+def waves(ticks: int, frequency: float) -> Array:
+    """A displacement (ticks, 1) of 1 m that oscillates."""
+    return np.asarray(np.sin(2.0 * np.pi * frequency * 2e-3 * np.arange(ticks)))[:, None]
+
+
+def test_slopes_at_slow_rows_are_those_of_the_motion() -> None:
+    """Ten rows in a period: a cubic spline's second slope is 3 % off."""
+    seen, frequency = np.arange(0, 3000, 5), 10.0
+    found = recorded_motion.slopes(waves(3000, frequency), seen, 2e-3)
+    turning = 2.0 * np.pi * frequency
+    inner = seen[20:-20]
+    velocity = turning * np.cos(turning * 2e-3 * inner)
+    assert found["velocity"][inner, 0] == pytest.approx(velocity, abs=1e-5 * turning)
+    bend = -(turning**2) * waves(3000, frequency)[inner, 0]
+    assert found["acceleration"][inner, 0] == pytest.approx(bend, abs=1e-3 * turning**2)
+    coarse = CubicSpline(seen * 2e-3, waves(3000, frequency)[seen, 0])(inner * 2e-3, 2)
+    assert np.max(np.abs(coarse - bend)) > 0.02 * turning**2
+
+
+def slowly(whole: Record, rate: float, names: tuple[str, ...]) -> Record:
+    """The record with a building of which a logger read these numbers at a rate (Hz), at ticks of the controller."""
+    channel = ImportedChannel(interpolated=True, rate=rate)
+    seen = channel.seen(whole.ticks, 2e-3)
+    read = {
+        name: CubicSpline(seen, whole.signals[name][seen])(np.arange(whole.ticks))
+        for name in (*names, "ground_acceleration")
+    }
+    followed = replace(channel, followed=True)
+    channels = {MASTER: dict.fromkeys(names, channel) | {"ground_acceleration": followed}}
+    run = replace(
+        whole.run, metadata=whole.run.metadata | {IMPORT: ImportedData("", channels=channels).metadata()}
+    )
+    kept = {name: value for name, value in whole.signals.items() if name not in recorded_motion.MOTION}
+    ground = {"ground_acceleration": whole.signals["ground_acceleration"]}  # an import follows the plan's
+    return replace(whole, run=run, signals=kept | read | ground)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("displacement",), ("displacement", "velocity"), ("displacement", "velocity", "acceleration")],
+    ids=len,
+)
+def test_a_building_balances_beside_rows_that_are_five_times_as_slow(
+    names: tuple[str, ...], cases: Cases
+) -> None:
+    record = slowly(cases.record(duration=12.0), 100.0, names)
+    part = LoggedBuilding(Building(record))
+    left, whole = part.left()[200:-200], part.measured[200:-200]
+    assert np.std(left) < 0.02 * np.std(whole)
+
+
+@pytest.mark.parametrize(
+    ("names", "left"), [(("displacement",), 0.0), (recorded_motion.MOTION, 1.0)], ids=["alone", "all"]
+)
+def test_a_ground_motion_beside_slow_displacements_has_nothing_that_these_cannot_show(
+    names: tuple[str, ...], left: float, cases: Cases
+) -> None:
+    """Rows of 100 Hz show a wave of 70 Hz as one of 30 Hz."""
+    whole = cases.record()
+    t = 2e-3 * np.arange(whole.ticks)
+    slow, fast = np.sin(2.0 * np.pi * 4.0 * t), np.sin(2.0 * np.pi * 70.0 * t)
+    ground = {"ground_acceleration": slow + fast}
+    record = slowly(replace(whole, signals=whole.signals | ground), 100.0, names)
+    seen = ImportedChannel(interpolated=True, rate=100.0).seen(whole.ticks, 2e-3)
+    found = recorded_motion.of_ground(record)[seen]
+    assert found[20:-20] == pytest.approx((slow + left * fast)[seen][20:-20], abs=0.02)
+
+
+def test_a_stated_filter_behind_the_master_is_told_by_slow_rows() -> None:
+    """Splines between rows have bends of their own, which say nothing of a filter."""
+    whole = np.random.default_rng(4).normal(size=(4000, 1))
+    rows = np.arange(0, 4000)
+    noise = np.random.default_rng(5).normal(size=(4000, 1))
+    ticks = np.arange(0.0, 3999.0, 0.2)
+    plain, behind = (CubicSpline(rows, x)(ticks) for x in (whole + noise, noise))
+    assert not logged_building.before_master(plain[::5], behind[::5])
+
+
+def test_a_hole_in_the_rows_leaves_nothing_in_the_balance_beside_it(cases: Cases) -> None:
+    whole = cases.record(duration=12.0)
+    hole = slice(3000, 3020)
+    there = {name: mask.copy() for name, mask in whole.present.items()}
+    signals = {name: values.copy() for name, values in whole.signals.items()}
+    for name in (*recorded_motion.MOTION[:1], "column_force", "damper_force_used"):
+        there[name][hole] = False
+        ends = np.linspace(0.0, 1.0, 22)
+        signals[name][2999:3021] = (1.0 - ends) * signals[name][2999] + ends * signals[name][3020]
+    for name in recorded_motion.MOTION[1:]:
+        signals.pop(name)
+    record = replace(whole, signals=signals, present=there)
+    part = LoggedBuilding(Building(record))
+    delayed = part.nuisances[[one.parameter for one in part.nuisances].index("delay")].moved(
+        System(part._plan), 0.3
+    )
+    left = np.where(part.present, part.left(delayed), 0.0)
+    assert not part.present[2998:3022].any()
+    assert part.present[:2998].all()
+    assert part.present[3022:].all()
+    near, far = np.std(left[2900:3100]), np.std(left[200:2800])
+    assert near < 1.3 * far
+
+
+def test_the_motion_that_noise_is_held_against_has_none_of_it(cases: Cases) -> None:
+    whole = cases.record(duration=12.0)
+    part = LoggedBuilding(Building(whole))
+    apart = np.diff(part.motion[:, 2], 4).std()
+    assert np.diff(part.smooth[:, 2], 4).std() < 1e-3 * apart
+    ticks = np.arange(whole.ticks) * 2e-3
+    slow = np.sin(2.0 * np.pi * ticks / part.shortest)
+    part.motion[:, 0] = slow + np.sin(6.0 * np.pi * ticks / part.shortest)
+    wave = part.smooth[500:-500, 0]
+    passed = np.exp(-0.5 * (0.25 * np.pi) ** 2)
+    assert wave == pytest.approx(passed * slow[500:-500], abs=0.07)

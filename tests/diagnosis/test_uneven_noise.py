@@ -207,3 +207,22 @@ def test_two_scales_of_slow_noise_are_not_two_witnesses(
     monkeypatch.setattr(uneven_noise, "at_scale", at_scale)
     found = uneven_noise.over_scales(white(1), [white(2)] * len(uneven_noise.SCALES), white(3))
     assert found.significance == pytest.approx(5.0 * np.sqrt(2.0) if together else 5.0)
+
+
+@pytest.mark.parametrize("retimed", [False, True])
+def test_bends_are_left_out_where_readings_hold_what_they_do_between_ticks(
+    retimed: bool, cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = cases.record(duration=8.0)
+    data = residuals.prepare(lab_b(whole), whole)
+    data = replace(data, part=data.part.replaced(retimed=retimed))
+    usual, asked = uneven_noise.amplitudes, []
+
+    def amplitudes(moving: Array, size: int, *, bends: bool) -> Array:
+        found = usual(moving, size, bends=bends)
+        asked.append(found.shape[1] / moving.shape[1])
+        return found
+
+    monkeypatch.setattr(uneven_noise, "amplitudes", amplitudes)
+    uneven_noise.uneven(fitting.at(data, {}, np.zeros(len(data.part.nuisances))))
+    assert set(asked) == {2.0 if retimed else 3.0}

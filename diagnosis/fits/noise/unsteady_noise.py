@@ -58,7 +58,7 @@ def by_reading(data: Data, single: Array, system: System) -> list[Unsteady | Non
         return [None] * single.shape[1]
     said = np.nan_to_num(data.part.predict(system))
     begun = np.concatenate([said[span] - said[span][0] for span in spans(data.part)])
-    others = motions(np.column_stack([inputs(data.part, system), begun]))
+    others = motions(inputs(data.part, system))
     sizes, interval = data.together(len(single)), data.system.plan.test.interval
     result: list[Unsteady | None] = []
     for place, one in enumerate(single.T):
