@@ -65,6 +65,16 @@ def white_noise(values: Array) -> float:
     return float(np.sum(np.square(apart))) / 70.0
 
 
+def within_tolerances(left: Array, slopes: Array, usual: float) -> Array:
+    """What of `left` (n,) parameters make up for, of which `slopes` (n, parameters) are those over tolerances.
+
+    Beside noise of a `usual` rms each errs by one tolerance. A building of any mass would leave less of the noise.
+    """
+    known = np.vstack([slopes, usual * np.eye(slopes.shape[1])])
+    z = np.linalg.lstsq(known, np.append(left, np.zeros(slopes.shape[1])))[0]
+    return np.asarray(slopes @ z)
+
+
 class LoggedBuilding(Building):
     """The numerical substructure whose forces came through a logger, by the balance of its forces.
 
@@ -129,8 +139,8 @@ class LoggedBuilding(Building):
         sums = left.reshape(len(systems), -1, size, left.shape[2]).sum(axis=2) / math.sqrt(size)
         rest, *others = sums.reshape(len(systems), -1)
         if others:
-            slopes = np.stack(others, axis=1) - rest[:, None]
-            rest = rest - slopes @ np.linalg.lstsq(slopes, rest)[0]
+            usual = math.sqrt(white_noise(sums[0]) / sums.shape[2])
+            rest = rest - within_tolerances(rest, np.stack(others, axis=1) - rest[:, None], usual)
         level = float(np.mean(np.square(rest))) * left.shape[2]
         fast, noise = (np.diff(x, n=4, axis=0)[::5].ravel() for x in (self.left(), self.measured))
         energy = float(noise @ noise)
