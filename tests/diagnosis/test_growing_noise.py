@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 from diagnosis.diagnose import diagnose
+from diagnosis.findings.sensors import uneven_noise
 from diagnosis.fits import evidence, fitting, residuals
 from diagnosis.fits.noise.inputs import motions
 from diagnosis.fits.noise.remainder import remainder
-from diagnosis.fits.noise.unsteady_noise import evened
+from diagnosis.fits.noise.unsteady_noise import by_reading, evened
+from diagnosis.recorded.building.building import Building
+from diagnosis.recorded.building.logged_building import LoggedBuilding
+from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise.growth import growing
 from models.registry import Array
@@ -133,3 +137,23 @@ def test_noise_that_grows_with_its_reading_is_no_gap(name: str, cases: Cases) ->
     assert result.status in ("no_gap", "within_tolerances", "explained")
     assert all(effect.endswith(".noise") for effect in result.which[0].effects)
     assert any(one.startswith(f"The noise of {name} grows with its reading") for one in result.warnings)
+
+
+def test_noise_of_a_force_that_grows_with_it_is_noise_of_the_balance_of_its_building(cases: Cases) -> None:
+    whole = cases.record(duration=12.0)
+    loud = grown(whole, "column_force")
+    data = residuals.prepare(LoggedBuilding(Building(loud)), loud)
+    joint = replace(data, part=JoinedPart((data.part, data.part)))
+    single = remainder(data, data.system).single
+    (one,) = by_reading(data, single, data.system)
+    (two,) = by_reading(joint, np.concatenate([single, single]), data.system)
+    for found, ticks in ((one, whole.ticks), (two, 2 * whole.ticks)):
+        assert found is not None
+        assert found.why == "grows"
+        assert found.loudness.size == ticks
+    read = whole.signals["column_force"]
+    assert one is not None
+    assert np.corrcoef(one.loudness, np.abs(read - read[0]))[0, 1] > 0.9
+    fit = fitting.at(replace(data, loudness=one.loudness[:, None]), {}, np.zeros(len(data.part.nuisances)))
+    (line,) = uneven_noise.unsteady_in(fit)
+    assert line.startswith("The noise of the balance of the building's forces grows with the force, to ")

@@ -214,9 +214,8 @@ def test_bends_are_left_out_where_readings_hold_what_they_do_between_ticks(
     retimed: bool, cases: Cases, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = cases.record(duration=8.0)
-    data = residuals.prepare(lab_b(whole), whole)
-    data = replace(data, part=data.part.replaced(retimed=retimed))
-    usual, asked = uneven_noise.amplitudes, []
+    data = residuals.prepare(lab_b(whole).replaced(retimed=retimed), whole)
+    usual, asked = uneven_noise.amplitudes, list[float]()
 
     def amplitudes(moving: Array, size: int, *, bends: bool) -> Array:
         found = usual(moving, size, bends=bends)

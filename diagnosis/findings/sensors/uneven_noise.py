@@ -26,6 +26,7 @@ from diagnosis.fits.noise.remainder import remainder
 from diagnosis.fits.noise.unsteady_noise import by_reading, evened
 from diagnosis.fits.unexplained import BOTH
 from diagnosis.fits.worth import SEEN
+from diagnosis.recorded.building.logged_building import BALANCE
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.systematic import correlations
 from models.registry import Array
@@ -178,13 +179,15 @@ def unsteady_in(fit: Fit) -> list[str]:
             continue
         times = float(one.loudness.max() / one.loudness.min())
         if one.why == "grows":
-            text = f"grows with its reading, to {times:.2g} times as much at the largest"
+            reading = "the force" if signal == BALANCE else "its reading"
+            text = f"grows with {reading}, to {times:.2g} times as much at the largest"
         else:
             loudest = float(np.argmax(one.loudness)) * data.system.plan.test.interval
             text = (
                 f"comes in bursts of up to {times:.2g} times its usual level, the loudest at {loudest:.1f} s"
             )
-        sentences.append(f"The noise of {signal} {text}, and counts as no gap.")
+        name = "the balance of the building's forces" if signal == BALANCE else signal
+        sentences.append(f"The noise of {name} {text}, and counts as no gap.")
     return sentences
 
 

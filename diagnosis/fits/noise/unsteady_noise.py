@@ -9,12 +9,12 @@ import numpy as np
 
 from diagnosis.fits import residuals
 from diagnosis.fits.noise.inputs import inputs, motions
-from diagnosis.fits.noise.remainder import Remainder, spans
+from diagnosis.fits.noise.remainder import Remainder
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.recorded.column_alone import ColumnAlone
 from diagnosis.recorded.joined import JoinedPart
-from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.signals.noise.bursts import bursting
 from diagnosis.signals.noise.growth import growing
 from models.registry import Array
@@ -56,20 +56,28 @@ def by_reading(data: Data, single: Array, system: System) -> list[Unsteady | Non
     first = data.part.pieces[0] if isinstance(data.part, JoinedPart) else data.part
     if data.static or not isinstance(first, LaboratoryPart | ColumnAlone | LoggedBuilding):
         return [None] * single.shape[1]
-    said = np.nan_to_num(data.part.predict(system))
-    begun = np.concatenate([said[span] - said[span][0] for span in spans(data.part)])
-    others = motions(inputs(data.part, system))
+    reading, others = readings(data.part, system), motions(inputs(data.part, system))
     sizes, interval = data.together(len(single)), data.system.plan.test.interval
     result: list[Unsteady | None] = []
     for place, one in enumerate(single.T):
         size, found = int(sizes[place]), None
         if data.live[place]:
-            if not isinstance(first, LoggedBuilding):
-                found = unsteady(growing(one, begun[:, place], others, size), "grows")
+            found = unsteady(growing(one, reading[:, place], others, size), "grows")
             if found is None and data.rounded[place] <= STEPS * data.white[place]:
                 found = unsteady(bursting(one, others, size, interval), "bursts")
         result.append(found)
     return result
+
+
+def readings(part: Part, system: System) -> Array:
+    """What is read by each sensor of a part, from where it begins, (ticks, signals); of a balance it is the force."""
+    if isinstance(part, JoinedPart):
+        return np.concatenate([readings(piece, system) for piece in part.pieces])
+    if isinstance(part, LoggedBuilding):
+        said = np.repeat(part.load[:, None], len(part.signals), axis=1)
+    else:
+        said = np.nan_to_num(part.predict(system))
+    return said - said[0]
 
 
 def unsteady(loudness: Array | None, why: Why) -> Unsteady | None:

@@ -215,13 +215,18 @@ class LoggedBuilding(Building):
 
     @property
     def smooth(self) -> Array:
-        """The motion without most of the noise of the forces that the controller read, shape as `motion`.
+        """The motion without most of the noise of the forces that the controller read, shape as `motion`."""
+        return self.smoothed(self.motion)
 
-        It is averaged with normal weights, which leave three natural frequencies of the stiffest mode 6 % of a wave.
-        """
-        return np.asarray(
-            ndimage.gaussian_filter1d(self.motion, SMOOTHED * self.shortest / self._interval, axis=0)
-        )
+    @property
+    def load(self) -> Array:
+        """The force of the master's laboratory without most of its noise, (ticks,) N."""
+        return self.smoothed(self._inputs[1])
+
+    def smoothed(self, values: Array) -> Array:
+        """Means of values (ticks, …) with normal weights, which leave 6 % of a third of the shortest period."""
+        width = SMOOTHED * self.shortest / self._interval
+        return np.asarray(ndimage.gaussian_filter1d(values, width, axis=0))
 
     def balance(self, system: System, motion: Array) -> Array:
         """M·ẍ + C·ẋ + K·x of the numerical part, (ticks, storeys) N, for displacement, velocity and acceleration."""
