@@ -17,8 +17,8 @@ from models.registry import Array
 WINDOW = 0.3  # s whose median tells a level, so that impacts and tails do not
 LEFT_OUT = 1  # mean sizes to either side that share differences with one, and tell nothing of it
 NEIGHBOURS = 6  # mean sizes to either side at least
-# Nats beyond steady noise from which on it comes in bursts, and the share of these that a law of one motion may tell: of
-# 440 readings behind loggers 19 had bursts, with 66 nats or more and a share of a third at most.
+# Nats beyond steady noise from which on it comes in bursts, and the share of these that a law of one motion may tell.
+# Of 440 readings behind loggers 19 had bursts, with 66 nats or more and a share of a third at most.
 SURE, FOLLOWS = 20.0, 0.5
 # Level of the loudest burst over that of most of the time: medians of steady noise come to 1.4 in half a minute, and
 # that of readings that were moved in time by ever another part of a row changes by a fifth.
