@@ -175,12 +175,14 @@ class Data:
         It is the same behind a filter of a logger, or where readings were moved in time: what the filter or the time is
         off, or readings do between the ticks, is more than such solutions differ by.
         """
-        return self if self.between else measured_by(replace(self, erring=FINE_ERROR), self.white)
+        if self.part.retimed or np.isfinite(self.part.passes).any():
+            return self
+        return measured_by(replace(self, erring=FINE_ERROR), self.white)
 
     @property
     def between(self) -> bool:
-        """Whether readings passed a filter of a logger or were moved in time, and hold what they do between ticks."""
-        return bool(self.part.retimed or np.isfinite(self.part.passes).any())
+        """Whether a logger recorded the readings, which then hold what they do between ticks."""
+        return any(one.of_record for one in self.part.nuisances)
 
     @property
     def good(self) -> Array:

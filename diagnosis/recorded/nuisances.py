@@ -308,9 +308,10 @@ def of_filters(
 def between_rows(lab: RecordedLaboratory, stated: Sequence[ImportedChannel]) -> tuple[LoggedReadings, ...]:
     """By how much all readings are late beyond stated delays, where their rows lie between ticks.
 
-    What a controller holds tells between which two rows a tick is, not where.
+    What a controller holds tells between which two rows a tick is, not where. So it is with rows as fast as the ticks
+    that came late: another device wrote them, whose rows are in step by no more than the times say.
     """
-    rates = [one.rate for one in stated if one.interpolated and one.rate > 0.0]
+    rates = [one.rate for one in stated if one.rate > 0.0 and (one.interpolated or one.delay > 0.0)]
     if not rates:
         return ()
     half = 0.5 / max(rates)

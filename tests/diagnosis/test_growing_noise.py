@@ -156,4 +156,22 @@ def test_noise_of_a_force_that_grows_with_it_is_noise_of_the_balance_of_its_buil
     assert np.corrcoef(one.loudness, np.abs(read - read[0]))[0, 1] > 0.9
     fit = fitting.at(replace(data, loudness=one.loudness[:, None]), {}, np.zeros(len(data.part.nuisances)))
     (line,) = uneven_noise.unsteady_in(fit)
-    assert line.startswith("The noise of the balance of the building's forces grows with the force, to ")
+    assert line.startswith("The noise of the balance of the building's forces grows with what is read, to ")
+
+
+def test_the_digits_that_a_log_prints_of_a_displacement_are_noise_of_its_building(cases: Cases) -> None:
+    whole = cases.record(duration=12.0)
+    exact = whole.signals["displacement"]
+    digits = np.floor(np.log10(np.maximum(np.abs(exact), 1e-12))) - 4.0  # five of them
+    read = np.round(exact / 10.0**digits) * 10.0**digits
+    kept = {
+        name: values for name, values in whole.signals.items() if name not in ("velocity", "acceleration")
+    }
+    printed = replace(whole, signals=kept | {"displacement": read})
+    building = Building(printed)
+    building._force = ""  # a building of whose forces none is read by its own laboratory
+    data = residuals.prepare(LoggedBuilding(building), printed)
+    (one,) = by_reading(data, remainder(data, data.system).single, data.system)
+    assert one is not None
+    assert one.why == "grows"
+    assert np.corrcoef(one.loudness, np.abs(exact - exact[0]))[0, 1] > 0.9

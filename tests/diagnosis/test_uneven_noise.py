@@ -209,12 +209,13 @@ def test_two_scales_of_slow_noise_are_not_two_witnesses(
     assert found.significance == pytest.approx(5.0 * np.sqrt(2.0) if together else 5.0)
 
 
-@pytest.mark.parametrize("retimed", [False, True])
+@pytest.mark.parametrize("logged", [False, True])
 def test_bends_are_left_out_where_readings_hold_what_they_do_between_ticks(
-    retimed: bool, cases: Cases, monkeypatch: pytest.MonkeyPatch
+    logged: bool, cases: Cases, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = cases.record(duration=8.0)
-    data = residuals.prepare(lab_b(whole).replaced(retimed=retimed), whole)
+    part = lab_b(whole).logged(whole.late) if logged else lab_b(whole)
+    data = residuals.prepare(part, whole)
     usual, asked = uneven_noise.amplitudes, list[float]()
 
     def amplitudes(moving: Array, size: int, *, bends: bool) -> Array:
@@ -224,4 +225,4 @@ def test_bends_are_left_out_where_readings_hold_what_they_do_between_ticks(
 
     monkeypatch.setattr(uneven_noise, "amplitudes", amplitudes)
     uneven_noise.uneven(fitting.at(data, {}, np.zeros(len(data.part.nuisances))))
-    assert set(asked) == {2.0 if retimed else 3.0}
+    assert set(asked) == {2.0 if logged else 3.0}

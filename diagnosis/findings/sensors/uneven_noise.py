@@ -179,7 +179,7 @@ def unsteady_in(fit: Fit) -> list[str]:
             continue
         times = float(one.loudness.max() / one.loudness.min())
         if one.why == "grows":
-            reading = "the force" if signal == BALANCE else "its reading"
+            reading = "what is read" if signal == BALANCE else "its reading"
             text = f"grows with {reading}, to {times:.2g} times as much at the largest"
         else:
             loudest = float(np.argmax(one.loudness)) * data.system.plan.test.interval

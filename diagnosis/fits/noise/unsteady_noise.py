@@ -70,13 +70,10 @@ def by_reading(data: Data, single: Array, system: System) -> list[Unsteady | Non
 
 
 def readings(part: Part, system: System) -> Array:
-    """What is read by each sensor of a part, from where it begins, (ticks, signals); of a balance it is the force."""
+    """What is read by each sensor of a part, or its balance holds, from where that begins, (ticks, signals)."""
     if isinstance(part, JoinedPart):
         return np.concatenate([readings(piece, system) for piece in part.pieces])
-    if isinstance(part, LoggedBuilding):
-        said = np.repeat(part.load[:, None], len(part.signals), axis=1)
-    else:
-        said = np.nan_to_num(part.predict(system))
+    said = part.read if isinstance(part, LoggedBuilding) else np.nan_to_num(part.predict(system))
     return said - said[0]
 
 

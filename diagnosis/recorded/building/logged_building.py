@@ -219,9 +219,16 @@ class LoggedBuilding(Building):
         return self.smoothed(self.motion)
 
     @property
-    def load(self) -> Array:
-        """The force of the master's laboratory without most of its noise, (ticks,) N."""
-        return self.smoothed(self._inputs[1])
+    def read(self) -> Array:
+        """What noise of the balance may grow with, without most of that noise, (ticks, storeys).
+
+        It is the force of the master's laboratory, N; where there is none the displacements, m, whose digits a log
+        prints to a share of them.
+        """
+        storeys = len(self.signals)
+        if self._force:
+            return np.repeat(self.smoothed(self._inputs[1])[:, None], storeys, axis=1)
+        return self.smooth[:, :storeys]
 
     def smoothed(self, values: Array) -> Array:
         """Means of values (ticks, …) with normal weights, which leave 6 % of a third of the shortest period."""
