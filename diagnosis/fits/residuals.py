@@ -180,7 +180,7 @@ class Data:
         return measured_by(replace(self, erring=FINE_ERROR), self.white)
 
     @property
-    def between(self) -> bool:
+    def by_logger(self) -> bool:
         """Whether a logger recorded the readings, which then hold what they do between ticks."""
         return any(one.of_record for one in self.part.nuisances)
 

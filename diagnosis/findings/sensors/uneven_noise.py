@@ -23,7 +23,7 @@ from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.noise import inputs
 from diagnosis.fits.noise.remainder import remainder
-from diagnosis.fits.noise.unsteady_noise import by_reading, evened
+from diagnosis.fits.noise.unsteady_noise import ROUNDED, by_reading, evened
 from diagnosis.fits.unexplained import BOTH
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.building.logged_building import BALANCE
@@ -40,8 +40,6 @@ OUTERMOST = 3.0
 SURE = 6.0
 SYMMETRIC = 1e-3  # skewness below which it changes nothing
 ALIKE = 1.2  # times the noise of one scale, below which that of the next one is as loud
-# Steps over the noise from which on the error of rounding, which depends on the motion, shows.
-ROUNDED = 0.5
 MEANS = ("delay", "lag", "gain")  # of readings: what an error by chance that follows the motion is on average
 
 
@@ -63,7 +61,7 @@ def uneven(fit: Fit) -> list[Uneven]:
     data, rest = evened(fit.data, remainder(fit.data, system), system)
     single = rest.single
     moving = inputs.inputs(data.part, system)[: len(single)]
-    motions = [amplitudes(moving, size, bends=not data.between) for size in SCALES]
+    motions = [amplitudes(moving, size, bends=not data.by_logger) for size in SCALES]
     said = np.nan_to_num(data.part.predict(system))[: len(single)]
     erring = BOTH * data.erring
     return [

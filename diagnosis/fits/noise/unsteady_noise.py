@@ -22,8 +22,8 @@ from models.system import System
 
 Why = Literal["grows", "bursts"]
 
-# Steps of a reading over its noise from which on its highest frequencies are those of the steps.
-STEPS = 0.5
+# Steps over the noise from which on the error of rounding, which depends on the motion, shows.
+ROUNDED = 0.5
 
 
 class Unsteady(NamedTuple):
@@ -37,8 +37,8 @@ def evened(data: Data, rest: Remainder, system: System) -> tuple[Data, Remainder
     """The data with how loud unsteady noise is, and the remainder as if that noise were steady."""
     data = replace(data, loudness=None)
     found = by_reading(data, rest.single, system)
-    unsteady = [place for place, one in enumerate(found) if one is not None]
-    if not unsteady:
+    uneven = [place for place, one in enumerate(found) if one is not None]
+    if not uneven:
         return data, rest
     steady = np.ones(len(data.part.measured))
     loudness = np.column_stack([steady if one is None else one.loudness for one in found])
@@ -47,7 +47,7 @@ def evened(data: Data, rest: Remainder, system: System) -> tuple[Data, Remainder
     noise = rest.noise if data.louder is None else rest.noise / data.louder
     even = rest._replace(noise=noise, single=single)
     white = data.white.copy()
-    white[unsteady] = data.white_part(single, uneven=True)[unsteady]
+    white[uneven] = data.white_part(single, uneven=True)[uneven]
     return residuals.measured_by(data, white), even
 
 
@@ -63,7 +63,7 @@ def by_reading(data: Data, single: Array, system: System) -> list[Unsteady | Non
         size, found = int(sizes[place]), None
         if data.live[place]:
             found = unsteady(growing(one, reading[:, place], others, size), "grows")
-            if found is None and data.rounded[place] <= STEPS * data.white[place]:
+            if found is None and data.rounded[place] <= ROUNDED * data.white[place]:
                 found = unsteady(bursting(one, others, size, interval), "bursts")
         result.append(found)
     return result
