@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import fft
 
-from diagnosis.findings.sensors.uneven_noise import ROUNDED
 from diagnosis.findings.sites.likely import APART
 from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis
+from diagnosis.fits.noise.unsteady_noise import ROUNDED
 from diagnosis.fits.residuals import Data, filled
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.parts import LaboratoryPart

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.findings.sensors.uneven_noise import ROUNDED
 from diagnosis.findings.sites.signatures import alone
 from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.noise.unsteady_noise import ROUNDED
 from diagnosis.fits.unexplained import BOTH, MATERIAL
 from diagnosis.recorded.parts import LaboratoryPart
 from models.registry import Array
