@@ -129,7 +129,7 @@ class Data:
             result[self.missing] = 0.0
         return result
 
-    def white_part(self, residual: Array, *, uneven: bool = False) -> Array:
+    def white_part(self, residual: Array) -> Array:
         """Rms (signals,) of the white part of residuals (ticks, signals), of the frequencies that a logger passed.
 
         Its filter cuts off the noise that came through it, and what it left above tells nothing of that. So as many
@@ -139,7 +139,7 @@ class Data:
         for size in np.unique(together):
             some = residual[: len(residual) // size * size, together == size]
             sums = some.reshape(-1, size, some.shape[1]).sum(axis=1) / math.sqrt(size)
-            result[together == size] = white_rms(sums, uneven=uneven)
+            result[together == size] = white_rms(sums)
         return result
 
     def together(self, ticks: int) -> NDArray[np.int64]:

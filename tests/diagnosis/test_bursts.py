@@ -16,8 +16,8 @@ from diagnosis.fits.noise.unsteady_noise import by_reading
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.recorded.record import Record
-from diagnosis.signals.noise import level
-from diagnosis.signals.noise.bursts import LOUDEST, bursting
+from diagnosis.signals.noise import growth
+from diagnosis.signals.noise.bursts import LEFT_OUT, LOUDEST, bursting, neighbouring
 from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_b
 
@@ -95,13 +95,28 @@ def test_noise_that_is_nowhere_but_in_few_places_has_no_bursts() -> None:
     assert found(moves * white(1)) is None
 
 
-def test_a_level_known_to_some_per_cent_leaves_tails_that_count() -> None:
-    known = np.repeat(np.exp(0.5 * white(4, TICKS // 20)), 20)[:, None]
-    residual = white(3)[:, None] * known
-    rms = float(np.std(residual))
-    assert level.white_rms(residual)[0] < 0.9 * rms
-    assert level.white_rms(residual, uneven=True)[0] == pytest.approx(rms, rel=0.06)
-    assert level.white_rms(np.column_stack([residual, white(5)]))[0] < 0.9 * rms  # the other one has none
+def test_a_level_is_told_by_its_neighbours_alone() -> None:
+    """Else steady noise would be likelier with a level of its own."""
+    rising = np.linspace(1.0, 2.0, 200)
+    other = rising.copy()
+    other[150] = 50.0
+    before, after = (level / level[-1] for level in (neighbouring(one, 6) for one in (rising, other)))
+    apart = np.flatnonzero(np.abs(after - before) > 1e-9) - 150
+    assert apart.size > 0
+    assert np.all(np.abs(apart) > LEFT_OUT)
+    assert np.all(np.abs(apart) <= 6)
+
+
+def test_a_short_record_of_noise_with_tails_has_no_bursts() -> None:
+    """Medians over few samples differ by more than twice, which is no evidence."""
+    loudest = []
+    for seed in range(120):
+        noise = np.random.default_rng(seed).standard_t(2.0, 420)
+        sizes = growth.sizes(noise, 1)
+        level = neighbouring(sizes, 6)
+        loudest.append(level.max() / level.min())
+        assert bursting(noise, np.zeros((420, 1)), 1, 0.02) is None
+    assert max(loudest) > LOUDEST
 
 
 def bursts_in(whole: Record, name: str) -> Record:

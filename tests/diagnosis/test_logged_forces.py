@@ -158,14 +158,44 @@ def test_a_ground_motion_beside_slow_displacements_has_nothing_that_these_cannot
     assert found[20:-20] == pytest.approx((slow + left * fast)[seen][20:-20], abs=0.02)
 
 
-def test_a_stated_filter_behind_the_master_is_told_by_slow_rows() -> None:
+def test_a_velocity_of_slow_rows_counts_beside_an_acceleration_only(cases: Cases) -> None:
+    whole = slowly(cases.record(), 100.0, recorded_motion.MOTION)
+    rows = {name: whole.signals[name][:, None] for name in recorded_motion.MOTION}
+    other = rows | {"velocity": rows["velocity"] + 1.0}
+    assert np.all(recorded_motion.of_storeys(whole, other)["velocity"] == other["velocity"])
+    less = {name: other[name] for name in recorded_motion.MOTION[:2]}
+    found = recorded_motion.of_storeys(whole, less)["velocity"]
+    assert np.max(np.abs(found - other["velocity"])) > 0.5
+    assert np.std(found - rows["velocity"]) < 0.05 * np.std(rows["velocity"])
+
+
+def test_a_stated_filter_behind_the_master_is_told_at_slow_rows(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Splines between rows have bends of their own, which say nothing of a filter."""
-    whole = np.random.default_rng(4).normal(size=(4000, 1))
-    rows = np.arange(0, 4000)
-    noise = np.random.default_rng(5).normal(size=(4000, 1))
-    ticks = np.arange(0.0, 3999.0, 0.2)
-    plain, behind = (CubicSpline(rows, x)(ticks) for x in (whole + noise, noise))
-    assert not logged_building.before_master(plain[::5], behind[::5])
+    record = slowly(cases.record(duration=12.0), 100.0, ("displacement",))
+    building = Building(record)
+    late = replace(building.channels[0], delay=0.02)
+    building.channels = (*building.channels[:-2], late, late)
+    asked: list[int] = []
+
+    def before_master(plain: Array, behind: Array) -> bool:
+        asked.extend((len(plain), len(behind)))
+        return False
+
+    monkeypatch.setattr(logged_building, "before_master", before_master)
+    assert logged_building.logged(building).behind
+    assert asked == [record.ticks // 5] * 2
+
+
+def test_parameters_make_up_for_noise_within_their_tolerances() -> None:
+    """A building that is heavier by a tolerance of 2 % has 2 % more of the noise of the motion, and so on."""
+    noise = np.random.default_rng(8).normal(size=600)
+    made_up = logged_building.within_tolerances(noise, 0.02 * noise[:, None], 1.0)
+    energy = float(noise @ noise)
+    expected = 4e-4 * energy / (1.0 + 4e-4 * energy)  # of a parameter of unit deviation
+    assert made_up == pytest.approx(expected * noise)
+    assert logged_building.within_tolerances(noise, 0.02 * noise[:, None], 0.0) == pytest.approx(noise)
 
 
 def test_a_hole_in_the_rows_leaves_nothing_in_the_balance_beside_it(cases: Cases) -> None:

@@ -203,10 +203,18 @@ def test_rows_between_ticks_leave_open_when_a_tick_was(cases: Cases) -> None:
     """Between two rows of a logger of 1000 Hz a tick may be anywhere, by 0.29 ms in the standard deviation."""
     between: dict[str, object] = {"delay": 0.016, "interpolated": True, "rate": 1000.0}
     part = lab_b(logged(cases.record(), between, lambda x: x)).logged(NOT_LATE)
-    late = [one for one in part.nuisances if isinstance(one, LoggedReadings) and one.parameter == "delay"]
-    assert [(one.tolerance, one.least) for one in late] == [pytest.approx((1e-3 / math.sqrt(12.0), -1e-3))]
-    assert late[0].signals == part.lab.kind.channels.names
-    on_ticks = lab_b(logged(cases.record(), {"delay": 0.016}, lambda x: x)).logged(NOT_LATE)
+    (late,) = (one for one in part.nuisances if isinstance(one, LoggedReadings) and one.parameter == "delay")
+    assert (late.tolerance, late.least) == pytest.approx((1e-3 / math.sqrt(12.0), -1e-3))
+    assert late.signals == part.lab.kind.channels.names
+    in_time: dict[str, object] = {
+        "delay": 0.016,
+        "rate": 500.0,
+    }  # of another device, whose rows stand on ticks
+    other = lab_b(logged(cases.record(), in_time, lambda x: x)).logged(NOT_LATE)
+    (late,) = (one for one in other.nuisances if isinstance(one, LoggedReadings) and one.parameter == "delay")
+    assert (late.tolerance, late.least) == pytest.approx((2e-3 / math.sqrt(12.0), -2e-3))
+    of_controller: dict[str, object] = {"delay_stated": True, "rate": 500.0}
+    on_ticks = lab_b(logged(cases.record(), of_controller, lambda x: x)).logged(NOT_LATE)
     assert [one for one in on_ticks.nuisances if isinstance(one, LoggedReadings)] == [
         one for one in part.nuisances if one.parameter == "gain"
     ]

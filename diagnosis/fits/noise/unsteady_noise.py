@@ -47,7 +47,7 @@ def evened(data: Data, rest: Remainder, system: System) -> tuple[Data, Remainder
     noise = rest.noise if data.louder is None else rest.noise / data.louder
     even = rest._replace(noise=noise, single=single)
     white = data.white.copy()
-    white[uneven] = data.white_part(single, uneven=True)[uneven]
+    white[uneven] = data.white_part(single)[uneven]
     return residuals.measured_by(data, white), even
 
 

@@ -9,7 +9,6 @@ clock that jitters and the chatter of a machine are louder in a while of much mo
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
 
 from diagnosis.signals.noise import growth
 from models.registry import Array
@@ -57,8 +56,9 @@ def bursting(noise: Array, motions: Array, size: int, interval: float) -> Array 
 
 def neighbouring(loud: Array, reach: int) -> Array:
     """The level (n,) by the medians of mean sizes (n,) up to `reach` away; that of most of them at least."""
-    reach = max(reach, NEIGHBOURS)
-    near = np.ones(2 * reach + 1, dtype=bool)
-    near[reach - LEFT_OUT : reach + LEFT_OUT + 1] = False
-    level = np.maximum(ndimage.median_filter(loud, footprint=near, mode="reflect"), np.median(loud))
+    reach = min(max(reach, NEIGHBOURS), loud.size // 4)
+    around = np.concatenate([loud[reach:0:-1], loud, loud[-2 : -reach - 2 : -1]])
+    windows = np.lib.stride_tricks.sliding_window_view(around, 2 * reach + 1)
+    others = np.delete(windows, np.arange(reach - LEFT_OUT, reach + LEFT_OUT + 1), axis=1)
+    level = np.maximum(np.median(others, axis=1), np.median(loud))
     return np.asarray(level * np.mean(loud / level))
