@@ -248,12 +248,18 @@ def test_a_building_is_averaged_over_a_twelfth_of_its_shortest_period(cases: Cas
 @pytest.mark.slow
 def test_noise_that_only_the_controller_read_is_no_fault_of_the_building(cases: Cases) -> None:
     whole = cases.record()
-    noise = 5e-3 * white(6, whole.ticks)  # m/s², in the acceleration that the master computed from it
+    noise = 5e-3 * white(7, whole.ticks)  # m/s², in the acceleration that the master computed from it
     unread = relogged(whole, "acceleration", whole.signals["acceleration"] + noise)
     unread = relogged(
         unread, "column_force", unread.signals["column_force"] + 0.5 * LEVEL * white(9, whole.ticks)
     )
     view, scales = logged(unread), Scales(unread)
+    longer = over_longer(view, cast(LoggedBuilding, view.part))
+    assert longer is not None
+    moved = [np.max(np.abs(search(data, scales).chosen.z)) for data in (view, longer)]
+    assert moved[0] > 2.0  # tolerances, which make that noise smaller over short averages
+    assert moved[1] < 1.5
+    assert by_balance(view, scales).search.data.group == longer.group
     found = verdict_on(residuals.prepare(Building(unread), unread), scales, view)
     assert found.outcome == "none"
     assert not found.search.chosen.z.any()  # no parameter moves to make that noise smaller
