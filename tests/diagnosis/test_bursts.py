@@ -15,6 +15,7 @@ from diagnosis.fits.noise.remainder import remainder
 from diagnosis.fits.noise.unsteady_noise import by_reading
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import LoggedBuilding
+from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.record import Record
 from diagnosis.signals.noise import growth
 from diagnosis.signals.noise.bursts import LEFT_OUT, LOUDEST, bursting, neighbouring
@@ -141,6 +142,16 @@ def test_the_noise_of_bursts_is_told_and_leaves_nothing(cases: Cases) -> None:
     assert line.startswith("The noise of damper_stroke comes in bursts of up to")
     loudest = round(float(line.split("loudest at ")[1].split(" s")[0]) / INTERVAL)
     assert loudness(5, whole.ticks)[loudest] > 0.8 * loudness(5, whole.ticks).max()
+
+
+def test_a_burst_is_told_by_the_time_in_its_own_recording(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    data = residuals.prepare(lab_b(whole), whole)
+    loud = np.ones(2 * whole.ticks)
+    loud[whole.ticks + 700] = 3.0
+    assert uneven_noise.loudest(loud[: whole.ticks], data) == 0.0
+    joint = replace(data, part=JoinedPart((data.part, data.part)))
+    assert uneven_noise.loudest(loud, joint) == pytest.approx(700 * INTERVAL)
 
 
 def test_noise_below_the_steps_of_a_converter_has_no_bursts(cases: Cases) -> None:

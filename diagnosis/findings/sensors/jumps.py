@@ -16,11 +16,11 @@ from scipy import fft
 from diagnosis.findings.sites.likely import APART
 from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis
-from diagnosis.fits.noise.unsteady_noise import ROUNDED
 from diagnosis.fits.residuals import Data, filled
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.noise import colour
+from diagnosis.signals.noise.rounding import SHOWS
 from models.registry import Array
 
 MOST = 40  # jumps: a zero that jumps more often is slow noise
@@ -133,7 +133,7 @@ def slow(data: Data, place: int) -> bool:
     """Whether a reading has noise of a colour that rounding does not make."""
     if not data.noise or data.noise[place].density is None:
         return False
-    return bool(data.rounded[place] <= ROUNDED * data.white[place])
+    return bool(data.rounded[place] <= SHOWS * data.white[place])
 
 
 def jumping(verdict: PartVerdict, place: int) -> Jumps:

@@ -16,9 +16,9 @@ from diagnosis.findings.sites.signatures import alone
 from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
-from diagnosis.fits.noise.unsteady_noise import ROUNDED
 from diagnosis.fits.unexplained import BOTH, MATERIAL
 from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.signals.noise.rounding import SHOWS
 from models.registry import Array
 
 # Nats of a line beyond what noise has, from which on it counts, and from which on another reading may show it as well.
@@ -87,7 +87,7 @@ def own_error(verdict: PartVerdict, part: LaboratoryPart) -> OwnError | None:
     data = verdict.search.data
     found = sways(verdict.search.chosen)
     least = np.maximum(MATERIAL, BOTH * data.fine.good / data.sigma)
-    smooth = data.rounded <= ROUNDED * data.white
+    smooth = data.rounded <= SHOWS * data.white
     seen = [
         place
         for place, one in enumerate(found)

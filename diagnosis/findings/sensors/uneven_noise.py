@@ -22,12 +22,14 @@ from diagnosis.findings.verdict import OwnError, PartVerdict
 from diagnosis.fits import hypothesis
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.noise import inputs
-from diagnosis.fits.noise.remainder import remainder
-from diagnosis.fits.noise.unsteady_noise import ROUNDED, by_reading, evened
+from diagnosis.fits.noise.remainder import remainder, spans
+from diagnosis.fits.noise.unsteady_noise import by_reading, evened
+from diagnosis.fits.residuals import Data
 from diagnosis.fits.unexplained import BOTH
 from diagnosis.fits.worth import SEEN
 from diagnosis.recorded.building.logged_building import BALANCE
 from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.signals.noise.rounding import SHOWS
 from diagnosis.signals.systematic import correlations
 from models.registry import Array
 
@@ -66,7 +68,7 @@ def uneven(fit: Fit) -> list[Uneven]:
     erring = BOTH * data.erring
     return [
         over_scales(single[:, place], motions, erring * said[:, place])
-        if live and rounded <= ROUNDED * white
+        if live and rounded <= SHOWS * white
         else STEADY
         for place, (live, rounded, white) in enumerate(zip(data.live, data.rounded, data.white, strict=True))
     ]
@@ -180,13 +182,18 @@ def unsteady_in(fit: Fit) -> list[str]:
             reading = "what is read" if signal == BALANCE else "its reading"
             text = f"grows with {reading}, to {times:.2g} times as much at the largest"
         else:
-            loudest = float(np.argmax(one.loudness)) * data.system.plan.test.interval
-            text = (
-                f"comes in bursts of up to {times:.2g} times its usual level, the loudest at {loudest:.1f} s"
-            )
+            at = loudest(one.loudness, data)
+            text = f"comes in bursts of up to {times:.2g} times its usual level, the loudest at {at:.1f} s"
         name = "the balance of the building's forces" if signal == BALANCE else signal
         sentences.append(f"The noise of {name} {text}, and counts as no gap.")
     return sentences
+
+
+def loudest(loudness: Array, data: Data) -> float:
+    """When noise is loudest by its loudness (ticks,), s in the recording in which it is."""
+    tick = int(np.argmax(loudness))
+    begins = [span.start or 0 for span in spans(data.part)]
+    return (tick - max(begin for begin in begins if begin <= tick)) * data.system.plan.test.interval
 
 
 def following(verdict: PartVerdict) -> dict[str, Uneven]:

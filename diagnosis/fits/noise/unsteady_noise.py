@@ -17,13 +17,11 @@ from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.signals.noise.bursts import bursting
 from diagnosis.signals.noise.growth import growing
+from diagnosis.signals.noise.rounding import SHOWS
 from models.registry import Array
 from models.system import System
 
 Why = Literal["grows", "bursts"]
-
-# Steps over the noise from which on the error of rounding, which depends on the motion, shows.
-ROUNDED = 0.5
 
 
 class Unsteady(NamedTuple):
@@ -63,7 +61,7 @@ def by_reading(data: Data, single: Array, system: System) -> list[Unsteady | Non
         size, found = int(sizes[place]), None
         if data.live[place]:
             found = unsteady(growing(one, reading[:, place], others, size), "grows")
-            if found is None and data.rounded[place] <= ROUNDED * data.white[place]:
+            if found is None and data.rounded[place] <= SHOWS * data.white[place]:
                 found = unsteady(bursting(one, others, size, interval), "bursts")
         result.append(found)
     return result

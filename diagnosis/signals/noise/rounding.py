@@ -21,6 +21,7 @@ INTERPOLATED = 1.5  # times a step, from which on another one is coarser
 LEVELS = 3
 # Of how often the commonest level occurs, up to which one may have come about between two others.
 SELDOM = 0.2
+SHOWS = 0.5  # steps over the noise, from which on the error of rounding, which depends on the motion, shows
 # Share of equal samples that must be multiples of a step, and how many times too large its first guess may be.
 MOST, TIMES = 0.8, 12
 ALIGNED = 1e-6  # of a step, within which a value counts as a multiple: far more than the rounding of floats
