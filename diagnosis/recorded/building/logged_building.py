@@ -231,7 +231,7 @@ class LoggedBuilding(Building):
         return self.smooth[:, :storeys]
 
     def smoothed(self, values: Array) -> Array:
-        """Means of values (ticks, …) with normal weights, which leave 6 % of a third of the shortest period."""
+        """Means of values (ticks, …) with normal weights: 6 % of a wave of a third of the shortest period is left."""
         width = SMOOTHED * self.shortest / self._interval
         return np.asarray(ndimage.gaussian_filter1d(values, width, axis=0))
 

@@ -19,8 +19,8 @@ GROUND = "ground_acceleration"
 # which ticks they showed, and nearly all were.
 SLOWER = 0.9
 # Degree of the spline of which slopes at slow rows are taken: at ten rows in a period the slope of a cubic one errs by
-# 0.1 %, its bend by 3 %, those of this one by 2e-6 and 2e-4.
-SMOOTH = 7
+# 0.1 %, its bend by 3 %, those of this one by 2e-7 and 2e-6.
+DEGREE = 7
 
 
 def of_storeys(record: Record, rows: Mapping[str, Array]) -> dict[str, Array]:
@@ -31,7 +31,7 @@ def of_storeys(record: Record, rows: Mapping[str, Array]) -> dict[str, Array]:
     motion faster than half their rate for a slower one, of which a velocity has more than a displacement.
     """
     interval, seen = record.plan.test.interval, shown(record, "displacement")
-    if seen is None or seen.size <= SMOOTH:
+    if seen is None or seen.size <= DEGREE:
         return differences(rows["displacement"], interval) | dict(rows)
     found = slopes(rows["displacement"], seen, interval)
     return found | dict(rows) if MOTION[-1] in rows else found
@@ -40,7 +40,7 @@ def of_storeys(record: Record, rows: Mapping[str, Array]) -> dict[str, Array]:
 def slopes(displacement: Array, seen: NDArray[np.int64], interval: float) -> dict[str, Array]:
     """Displacements (ticks, storeys), and their slopes at the ticks `seen`, on cubic splines between these."""
     when, found = seen * interval, {MOTION[0]: displacement}
-    smooth = make_interp_spline(when, displacement[seen], k=SMOOTH)
+    smooth = make_interp_spline(when, displacement[seen], k=DEGREE)
     for order, name in enumerate(MOTION[1:], 1):
         spline = CubicSpline(when, smooth.derivative(order)(when))
         found[name] = np.asarray(spline(interval * np.arange(len(displacement))))

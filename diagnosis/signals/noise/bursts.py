@@ -19,7 +19,7 @@ NEIGHBOURS = 6  # mean sizes to either side at least
 # Nats beyond steady noise from which on it comes in bursts, and the share of these that a law of one motion may tell.
 # Of 440 readings behind loggers 19 had bursts, with 66 nats or more and a share of a third at most.
 SURE, FOLLOWS = 20.0, 0.5
-# Level of the loudest burst over that of most of the time: medians of steady noise come to 1.4 in half a minute, and
+# Level of the loudest burst over that of most of the time: medians of steady noise come to 1.6 in half a minute, and
 # that of readings that were moved in time by ever another part of a row changes by a fifth.
 LOUDEST = 2.0
 
