@@ -17,7 +17,7 @@ from common.terminal.telling import Tell, untold
 from diagnosis.findings import report, where
 from diagnosis.findings.certainty.other_causes import small
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.logged import building, delays, filters, logger, means, start
+from diagnosis.findings.logged import building, delays, filters, logger, means, shapes, start
 from diagnosis.findings.sensors import jumps, outliers, readings, staircases, swaying, uneven_noise
 from diagnosis.findings.sensors.loud_noise import no_noise
 from diagnosis.findings.sensors.noise_levels import highest_rms, lines_rms, noise_rms
@@ -90,7 +90,8 @@ def diagnose(
 
 def put_right(record: Record) -> Record:
     """A record on the clock of its commands, with what its logger did to its readings and its map does not state."""
-    return start.begun(means.averaged(delays.delayed(filters.filtered(logger.clocked(logger.whole(record))))))
+    timed = logger.clocked(logger.whole(record))
+    return start.begun(shapes.shaped(means.averaged(delays.delayed(filters.filtered(timed)))))
 
 
 def among(record: Record, systems: Mapping[str, System]) -> Record:

@@ -114,11 +114,18 @@ class ImportedChannel:
     average: float = 0.0  # s, up to which each of its samples is a mean
     delay_stated: bool = False  # whether its delay is, which may be none
     followed: bool = False  # whether it is the plan's own motion between the ticks that its rows showed
+    means: int = 1  # how many such means follow one another: three in a converter with a sinc³ filter
+    smooth: bool = False  # whether a filter without any other trace took away what is faster than the ticks
+
+    @property
+    def blunt(self) -> bool:
+        """Whether a filter or mean takes away what a reading does between two ticks."""
+        return self.filter is not None or self.average > 0.0 or self.smooth
 
     @property
     def between(self) -> bool:
         """Whether its samples lie between ticks, and show what a reading does there."""
-        return self.interpolated and self.rate > 0.0 and self.filter is None and self.average == 0.0
+        return self.interpolated and self.rate > 0.0 and not self.blunt
 
     def samples(self, ticks: int, interval: float) -> Samples:
         """When the samples that were interpolated at `ticks` were taken, in ticks."""
@@ -134,13 +141,13 @@ class ImportedChannel:
     def passes(self) -> float:
         """Frequency up to which the channel passes a signal and its noise, Hz: its cutoff, or half its own rate."""
         own = 0.5 * self.rate if self.interpolated and self.rate > 0.0 else math.inf
-        mean = HALF_POWER / self.average if self.average > 0.0 else math.inf
+        mean = HALF_POWER / (self.average * math.sqrt(self.means)) if self.average > 0.0 else math.inf
         return min(own, mean, self.filter.cutoff if self.filter else math.inf)
 
     @property
     def late(self) -> float:
         """By how much the channel comes late, s: its delay and what filter and mean delay slow motion by."""
-        late = self.delay + 0.5 * self.average
+        late = self.delay + 0.5 * self.means * self.average
         if self.filter is None:
             return late
         above, below = (np.append(0.0, row)[-2:] / row[-1] for row in self.filter.transfer)
@@ -148,9 +155,9 @@ class ImportedChannel:
 
     def response(self, frequency: Samples) -> NDArray[np.complex128]:
         """Frequency response of its filters, mean and delay at `frequency` (Hz)."""
-        late = self.delay + 0.5 * self.average
+        late = self.delay + 0.5 * self.means * self.average
         turned = np.exp(-2j * math.pi * late * np.asarray(frequency))
-        turned *= np.sinc(self.average * np.asarray(frequency))
+        turned *= np.sinc(self.average * np.asarray(frequency)) ** self.means
         if self.high_pass:
             turned /= 1.0 + self.high_pass / (1j * np.maximum(frequency, TINY))
         return np.asarray(turned if self.filter is None else turned * self.filter.response(frequency))
@@ -162,7 +169,7 @@ class ImportedChannel:
         """
         seen = past_high_pass(values, interval, self.high_pass) if self.high_pass else values
         seen = self.filter.filtered(seen, interval) if self.filter else seen
-        seen = averaged(seen, interval, self.average) if self.average else seen
+        seen = averaged(seen, interval, self.average, self.means) if self.average else seen
         late = self.delay + more
         return seen if late == 0.0 else later(seen, late / interval)
 
@@ -186,17 +193,17 @@ class ImportedData:
         """What is stated about a signal; `NOTHING_STATED` for one that the map does not name."""
         return self.channels.get(topic, {}).get(name, NOTHING_STATED)
 
-    def with_filter(self, topic: str, name: str, one: LoggerFilter) -> ImportedData:
-        """The same with a filter of a signal's channel."""
-        rows = {**self.channels.get(topic, {}), name: replace(self.channel(topic, name), filter=one)}
-        return replace(self, channels={**self.channels, topic: rows})
+    def behind(self, topic: str, name: str, one: ImportedChannel) -> ImportedData:
+        """The same with the filter or mean of `one` in a signal's channel, of which no more than a delay is stated.
 
-    def with_average(self, topic: str, name: str, length: float) -> ImportedData:
-        """The same with a signal's channel whose samples are means over some s, of which only a delay may be stated."""
+        That delay is the one of filter or mean then.
+        """
         said = self.channel(topic, name)
-        delay = said.delay - 0.5 * length if said.delay else 0.0
-        one = replace(said, delay=delay, average=length)
-        return replace(self, channels={**self.channels, topic: {**self.channels.get(topic, {}), name: one}})
+        delay = said.delay - replace(one, delay=0.0).late if said.delay else 0.0
+        found = replace(
+            said, filter=one.filter, average=one.average, means=one.means, smooth=one.smooth, delay=delay
+        )
+        return replace(self, channels={**self.channels, topic: {**self.channels.get(topic, {}), name: found}})
 
     def with_delay(self, topic: str, name: str, delay: float) -> ImportedData:
         """The same with a signal's channel that is later by some s."""
@@ -276,11 +283,14 @@ def past_high_pass(values: Samples, interval: float, corner: float) -> Samples:
     return np.asarray(signal.lfilter([-math.expm1(-step) / step], [1.0, -kept], change))
 
 
-def averaged(values: Samples, interval: float, length: float) -> Samples:
+def averaged(values: Samples, interval: float, length: float, means: int = 1) -> Samples:
     """Means of a signal (ticks,) over the last `length` s, smooth between ticks and constant before the first one.
 
-    A twelfth of the second differences gives back what straight lines between ticks would take away.
+    They are means of means, so many times. A twelfth of the second differences gives back what straight lines between
+    ticks would take away.
     """
+    for _ in range(means - 1):
+        values = averaged(values, interval, length)
     moved = values - values[0]
     moved[1:-1] -= np.diff(moved, 2) / 12.0
     whole = np.append(0.0, np.cumsum(0.5 * (moved[1:] + moved[:-1])))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -80,8 +81,13 @@ def apart(motion: ImportedChannel, force: ImportedChannel) -> tuple[ImportedChan
     """
 
     def chain(channel: ImportedChannel) -> ImportedChannel:
-        return ImportedChannel(
-            channel.filter, channel.delay, high_pass=channel.high_pass, average=channel.average
+        return replace(
+            NOTHING_STATED,
+            filter=channel.filter,
+            delay=channel.delay,
+            high_pass=channel.high_pass,
+            average=channel.average,
+            means=channel.means,
         )
 
     if chain(motion) == chain(force):

@@ -13,7 +13,6 @@ from common.plan.plan import Plan
 from common.recording.imported import NOTHING_STATED, ImportedChannel, ImportedData
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.record import Late, Record
-from models.registry import Array
 from models.system import SensorEffects, System
 
 # Standard deviations within which a logger's channels are expected. LATE: a filter of 40 Hz, usual before sampling at
@@ -22,7 +21,6 @@ from models.system import SensorEffects, System
 # transducers are calibrated to a percent.
 LATE = 4e-3  # s
 ALIKE = 5e-4  # s
-AS_LATE = 1e-4  # s, steps in which it is told by how much samples between ticks are late
 UNLIKE = 0.5
 CALIBRATED = 0.01
 EVENLY = 3.0**-0.5  # rms of what is anywhere from zero to a bound, over that bound
@@ -177,88 +175,6 @@ def channels(stated: ImportedData | None, lab: RecordedLaboratory) -> tuple[Impo
     if stated is None:
         return (NOTHING_STATED,) * len(lab.measured)
     return tuple(stated.channel(lab.role, name) for name in lab.kind.channels.names)
-
-
-def through_logger(
-    readings: Array,
-    lab: RecordedLaboratory,
-    system: System,
-    stated: Sequence[ImportedChannel],
-    drive: Sequence[Array],
-) -> Array:
-    """What a logger records of a laboratory's readings (ticks, signals): after its filters and delays.
-
-    With the commands that `drive` the laboratory, it is known what the readings do between ticks. A motion that
-    diverges passes no logger.
-    """
-    if not np.isfinite(readings).all():
-        return readings
-    interval = system.plan.test.interval
-    made = [system.effects.sensors.get(name) for name in lab.kind.channels.names]
-    later = [one.logger_delay if one else 0.0 for one in made]
-    places = [
-        None
-        if channel.filter or channel.average
-        else 0.0
-        if channel.between
-        else (-(channel.delay + more) / interval) % 1.0
-        for channel, more in zip(stated, later, strict=True)
-    ]
-    result = readings
-    if drive and any(place != 0.0 for place in places):
-        between = lab.kind.between_ticks(system, np.stack(drive, axis=1), places)
-        result = result + np.where([place != 0.0 for place in places], between, 0.0)
-    for number, (channel, more) in enumerate(zip(stated, later, strict=True)):
-        if channel.filter or channel.average or channel.high_pass or channel.delay + more:
-            result[:, number] = channel.through(result[:, number], interval, more)
-    return result
-
-
-def lateness(
-    lab: RecordedLaboratory, system: System, stated: Sequence[ImportedChannel]
-) -> tuple[float | None, ...]:
-    """By how much channels are late whose samples lie between ticks, s, in steps; None for others."""
-    made = [system.effects.sensors.get(name) for name in lab.kind.channels.names]
-    late = [one.delay + (more.logger_delay if more else 0.0) for one, more in zip(stated, made, strict=True)]
-    return tuple(
-        AS_LATE * round(value / AS_LATE) if one.between else None
-        for one, value in zip(stated, late, strict=True)
-    )
-
-
-def interpolated(
-    lab: RecordedLaboratory,
-    system: System,
-    drive: Array,
-    stated: Sequence[ImportedChannel],
-    late: Sequence[float | None],
-) -> Array:
-    """What interpolation at the ticks makes of what readings do between them, (ticks, channels).
-
-    A logger that is not in step samples a reading between ticks, `late` by some s; None for another channel. A cubic
-    spline through these samples was taken for its values at the ticks.
-    """
-    from scipy import ndimage
-
-    interval, ticks = system.plan.test.interval, len(drive)
-    result = np.zeros((ticks, len(stated)))
-    taken = {
-        number: (channel.first, channel.rate, delay)
-        for number, (channel, delay) in enumerate(zip(stated, late, strict=True))
-        if delay is not None
-    }
-    for first, rate, delay in dict.fromkeys(taken.values()):
-        where = ImportedChannel(first=first, rate=rate).samples(ticks, interval)
-        apart = lab.kind.apart(system, drive, where - delay / interval)
-        if isinstance(apart, float):
-            return result
-        at_ticks = (np.arange(ticks) * interval - first) * rate
-        for number in (number for number, one in taken.items() if one == (first, rate, delay)):
-            if apart[:, number].any():
-                result[:, number] = ndimage.map_coordinates(
-                    apart[:, number], at_ticks[None], order=3, mode="nearest"
-                )
-    return result
 
 
 def of_logger(

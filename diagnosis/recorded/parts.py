@@ -17,6 +17,8 @@ from common.plan.plan import Plan
 from common.recording.imported import at_rest
 from diagnosis.recorded.commands import followed
 from diagnosis.recorded.laboratory import RecordedLaboratory
+from diagnosis.recorded.logger.finer import Finer
+from diagnosis.recorded.logger.through import through_logger
 from diagnosis.recorded.nuisances import (
     BETWEEN,
     CALIBRATED,
@@ -25,13 +27,10 @@ from diagnosis.recorded.nuisances import (
     between_rows,
     calibrations,
     channels,
-    interpolated,
-    lateness,
     nothing_stated,
     nuisances,
     of_filters,
     of_logger,
-    through_logger,
 )
 from diagnosis.recorded.record import Late, Record
 from diagnosis.signals import pieces
@@ -101,7 +100,7 @@ def cut(part: Any, ticks: int, inputs: Any) -> Any:
 def with_fields(part: Any, fields: dict[str, Any]) -> Any:
     """A copy of a part with some of its fields replaced, which has not played any system yet."""
     result = copy.copy(part)
-    for name, value in ({"played": (), "curved": None, "misses": {}} | fields).items():
+    for name, value in ({"played": (), "curved": None, "between": None} | fields).items():
         setattr(result, name, value)
     return result
 
@@ -156,6 +155,7 @@ class LaboratoryPart:
     blurred: Array | float = 0.0
     played: tuple[tuple[System, Array], ...] = ()  # systems with what they did, the newest last
     curved: Array | None = None  # what `bends` gives
+    between: Finer | None = None  # what `finer` gives
 
     def __init__(self, record: Record, lab: RecordedLaboratory) -> None:
         self.lab, self.name, self.role = lab, lab.title, lab.role
@@ -171,7 +171,6 @@ class LaboratoryPart:
         self.channels = channels(record.stated, lab)
         kept = at_rest(record.run)
         self.rest = tuple(kept.get((lab.role, channel)) for channel in lab.kind.channels.names)
-        self.misses: dict[tuple[float | None, ...], Array] = {}  # what `missed` gives
         interval = record.plan.test.interval
         sampled = [one.interpolated or one.rate * interval > OWN_RATE for one in self.channels]
         self.retimed = record.retimed or any(sampled)
@@ -182,8 +181,8 @@ class LaboratoryPart:
         # an actuator that holds its command from the tick on needs no straight lines
         held = lab.kind.name == COLUMN and lab.plan.actuator.command == "held"
         self.steps = 0 if held else record.steps if self.built_in else min(record.steps, 1)
-        self._interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
-        self.early = 0.0 if self.steps or record.numbered else self._interval
+        self.interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
+        self.early = 0.0 if self.steps or record.numbered else self.interval
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)
         sites = [
@@ -233,21 +232,17 @@ class LaboratoryPart:
         drive += [none] * (2 - len(drive))
         found = replay.read(self.lab.kind, system, self.motion(system.unread, drive))
         found = through_logger(found, self.lab, system, self.channels, drive if self.steps == 0 else [])
-        if self.steps == 0 and any(channel.between for channel in self.channels):
-            found = found + self.missed(lateness(self.lab, system, self.channels), drive)
+        if self.steps == 0 and self.built_in:
+            found = found + self.finer(drive).missed(system)
         if self.freed >= 0:
             found[:, self.freed] += self.begun_elsewhere(self.measured[:, self.freed] - found[:, self.freed])
         return found
 
-    def missed(self, late: tuple[float | None, ...], drive: list[Array]) -> Array:
-        """What an interpolation misses of readings that are `late`, (ticks, channels), by the plan's laboratory.
-
-        That depends on what a fit moves in the second order only.
-        """
-        if late not in self.misses:
-            rows = np.stack(drive, axis=1)
-            self.misses[late] = interpolated(self.lab, System(self.lab.plan), rows, self.channels, late)
-        return self.misses[late]
+    def finer(self, drive: list[Array]) -> Finer:
+        """The plan's laboratory between the ticks."""
+        if self.between is None:
+            self.between = Finer(self.lab, self.channels, np.stack(drive, axis=1), self._start, self.anew)
+        return self.between
 
     @property
     def passes(self) -> Array:
@@ -267,7 +262,7 @@ class LaboratoryPart:
         """What of the motion that a replay misses (ticks,) follows from where and how fast each piece begins."""
         there = self.present[:, self.freed]
         return pieces.begun(
-            missed, there, np.asarray(self.anew)[:, 0].astype(int), self._interval, self._decay
+            missed, there, np.asarray(self.anew)[:, 0].astype(int), self.interval, self._decay
         )
 
     def motion(self, system: System, drive: list[Array]) -> Array:
@@ -325,7 +320,7 @@ class LaboratoryPart:
     @property
     def _piece(self) -> int:
         """Ticks of a piece of a motion without a restoring force."""
-        return max(4 * REACH, round(PIECE / self._interval))
+        return max(4 * REACH, round(PIECE / self.interval))
 
     def rested(self, system: System) -> bool:
         """Whether a replay from rest is nearer to the motion than one from the state that was read.
@@ -355,7 +350,7 @@ class LaboratoryPart:
         What it does to one channel it mostly does to all, to forces as to the others; `spread` is the standard
         deviation of their delays, s. A stated delay or calibration stays; a stated filter's delay is known to a tenth.
         """
-        lab, held = self.lab, self._interval if self.steps else 0.0
+        lab, held = self.lab, self.interval if self.steps else 0.0
         retimed = self.retimed or max(late.force.about, late.motion.about) > BETWEEN
         delays = of_filters(lab, self.channels, held) or between_rows(lab, self.channels)
         if self.free:

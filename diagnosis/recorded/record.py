@@ -15,7 +15,7 @@ from common.errors import InputError
 from common.plan.plan import Plan, ideal
 from common.plan.read import parse
 from common.recording.holds import before, holds
-from common.recording.imported import ImportedData, LoggerFilter, imported, logged_alone
+from common.recording.imported import ImportedChannel, ImportedData, imported, logged_alone
 from common.recording.run import GROUND, Run
 from common.roles import MASTER, SLAVE, title
 from common.signals import BUILDING as OF_BUILDING
@@ -103,10 +103,8 @@ class Record:
     edges: tuple[str, ...] = ()
     start: LoggerStart | None = None  # of an import whose ground motion is not on the plan's ticks
     late: Late = NOT_LATE  # by which a logger delays all channels of a kind
-    # filters of channels that its import map does not state, by topic and name
-    passed: Mapping[tuple[str, str], LoggerFilter] = field(default_factory=dict)
-    # s, of channels whose samples are means over as long, which the map does not state, by topic and name
-    averaged: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    # filters and means of channels that its import map does not state, by topic and name
+    passed: Mapping[tuple[str, str], ImportedChannel] = field(default_factory=dict)
     # s, by which channels are late beside filters that the map states, by topic and name
     delayed: Mapping[tuple[str, str], float] = field(default_factory=dict)
     worked_out: tuple[str, ...] = ()  # commands that were not recorded and follow from what was
@@ -121,9 +119,7 @@ class Record:
         """The properties of the logger's channels that the import map states, with what was found of its filters."""
         said = self.mapped
         for (topic, name), one in self.passed.items():
-            said = said and said.with_filter(topic, name, one)
-        for (topic, name), length in self.averaged.items():
-            said = said and said.with_average(topic, name, length)
+            said = said and said.behind(topic, name, one)
         for (topic, name), delay in self.delayed.items():
             said = said and said.with_delay(topic, name, delay)
         return said

@@ -17,15 +17,16 @@ def alike(columns: Array, stated: Sequence[ImportedChannel], late: float, interv
     None is undone: each series passes those of the others. Before the first tick all is at rest, as in the model.
     """
     filters = list(dict.fromkeys(one.filter for one in stated if one.filter is not None))
-    lengths = list(dict.fromkeys(one.average for one in stated if one.average))
+    means = list(dict.fromkeys((one.average, one.means) for one in stated if one.average))
     result = np.empty_like(columns)
     for place, channel in enumerate(stated):
         values = columns[:, place]
         values = begun(values, channel, interval)
         for one in filters:
             values = values if one == channel.filter else passed(values, one, interval)
-        for length in lengths:
-            values = values if length == channel.average else mean(values, length, interval)
+        for one_mean in means:
+            own = one_mean == (channel.average, channel.means)
+            values = values if own else mean(values, *one_mean, interval)
         result[:, place] = earlier(values, (channel.delay - late) / interval)
     return result
 
@@ -35,14 +36,14 @@ def passed(values: Array, one: LoggerFilter, interval: float) -> Array:
     return one.filtered(np.append(0.0, values), interval)[1:]
 
 
-def mean(values: Array, length: float, interval: float) -> Array:
-    """A series (ticks,), zero before its first tick, as means over the last `length` s."""
-    return averaged(np.append(0.0, values), interval, length)[1:]
+def mean(values: Array, length: float, times: int, interval: float) -> Array:
+    """A series (ticks,), zero before its first tick, as means over the last `length` s, so many times."""
+    return averaged(np.append(0.0, values), interval, length, times)[1:]
 
 
 def begun(values: Array, channel: ImportedChannel, interval: float) -> Array:
     """What filter and mean of a channel gave (ticks,) that had seen the first value ever before, as if it were zero."""
     first = seen = np.full(values.size, values[0])
     seen = passed(seen, channel.filter, interval) if channel.filter is not None else seen
-    seen = mean(seen, channel.average, interval) if channel.average else seen
+    seen = mean(seen, channel.average, channel.means, interval) if channel.average else seen
     return values - first + seen

@@ -13,6 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -51,6 +52,7 @@ class ReadSpectra(NamedTuple):
     slopes: Lines  # (lines, readings, parameters) of these over parameters that err by about one
     starts: NDArray[np.int64]  # (bands,) first line of each band
     noisy: bool  # whether the readings without a filter hold noise that those recorded need not have
+    rounds: int = ROUNDS  # of fits of the parameters, one where these are nearly at their best
 
 
 def spectra(
@@ -59,6 +61,7 @@ def spectra(
     slopes: Array,
     interval: float,
     highest: float = HIGHEST,
+    bands: int = BANDS,
     *,
     noisy: bool = False,
 ) -> ReadSpectra:
@@ -76,7 +79,7 @@ def spectra(
         return np.asarray(np.fft.rfft(shaped, axis=0)[kept])
 
     frequency = frequency[kept]
-    edges = np.geomspace(frequency[0], frequency[-1], BANDS + 1)[:-1]
+    edges = np.geomspace(frequency[0], frequency[-1], bands + 1)[:-1]
     starts = np.unique(np.searchsorted(frequency, edges))
     return ReadSpectra(frequency, lines(read), lines(true), lines(slopes), starts, noisy)
 
@@ -84,6 +87,12 @@ def spectra(
 def surprise(of: ReadSpectra, channel: ImportedChannel) -> float:
     """−2·log of how probable the readings are behind a filter or delay, at the best parameters, up to a constant."""
     return weighed(of, behind(of, channel))
+
+
+def surprise_as_is(of: ReadSpectra) -> float:
+    """The same without a filter or delay, and with the parameters where they are."""
+    level = np.maximum(squares(of, of.read - of.true), SMALLEST**2 * squares(of, of.read))
+    return weighed(of, Unlike(level, 0.0))
 
 
 def surprises(of: Sequence[ReadSpectra], channel: ImportedChannel) -> float:
@@ -98,7 +107,7 @@ def surprise_unknown(of: ReadSpectra) -> float:
 
 def missed(of: ReadSpectra, channel: ImportedChannel) -> float:
     """Largest share of a reading's rms that is left behind a filter or delay, at the best parameters."""
-    rest, whole = (counts(of) @ level for level in (behind(of, channel).level, means(of, of.read)))
+    rest, whole = (counts(of) @ level for level in (behind(of, channel).level, squares(of, of.read)))
     return float(np.sqrt(np.max(rest / whole)))
 
 
@@ -113,20 +122,20 @@ def behind(of: ReadSpectra, channel: ImportedChannel, free: int | None = None) -
     """What is left of readings behind a filter or delay, at the best parameters, of which one may be `free`."""
     passed = channel.response(of.frequency)[:, None]
     left, slopes = of.read - passed * of.true, passed[:, :, None] * of.slopes
-    least, most = SMALLEST**2 * means(of, of.read), highest(of)
+    least, most = SMALLEST**2 * squares(of, of.read), highest(of)
     known = np.arange(of.slopes.shape[2]) != free
-    found = [Unlike(np.maximum(means(of, left), least), 0.0)]
-    for _ in range(ROUNDS):
+    found = [Unlike(np.maximum(squares(of, left), least), 0.0)]
+    for _ in range(of.rounds):
         # a band whose noise hides how the two go together tells nothing of a parameter, which would shrink that noise
         level = np.where(found[-1].level < most, found[-1].level, math.inf)
         z = fitted(left, slopes, np.repeat(level, counts(of), axis=0), known)
-        found.append(Unlike(np.maximum(means(of, left - slopes @ z), least), float(z[known] @ z[known])))
+        found.append(Unlike(np.maximum(squares(of, left - slopes @ z), least), float(z[known] @ z[known])))
     return min(found, key=lambda one: weighed(of, one))
 
 
 def highest(of: ReadSpectra) -> Array:
     """Mean square (bands, readings) from which on nothing of a reading goes together with what it would be."""
-    return means(of, of.read) if of.noisy else np.full((of.starts.size, of.read.shape[1]), math.inf)
+    return squares(of, of.read) if of.noisy else np.full((of.starts.size, of.read.shape[1]), math.inf)
 
 
 def weighed(of: ReadSpectra, left: Unlike) -> float:
@@ -140,7 +149,9 @@ def likelier_whole(of: ReadSpectra, less: ReadSpectra) -> float:
 
     What takes away a part of a signal leaves less, and what was recorded of that part with noise of its own adds this.
     """
-    whole, rest = (np.maximum(means(one, one.true), SMALLEST**2 * means(of, of.read)) for one in (of, less))
+    whole, rest = (
+        np.maximum(squares(one, one.true), SMALLEST**2 * squares(of, of.read)) for one in (of, less)
+    )
     return 2.0 * OWN * float(np.sum(counts(of) @ np.log(rest / whole)))
 
 
@@ -149,7 +160,7 @@ def counts(of: ReadSpectra) -> NDArray[np.int64]:
     return np.diff(np.append(of.starts, of.frequency.size))
 
 
-def means(of: ReadSpectra, values: Lines) -> Array:
+def squares(of: ReadSpectra, values: Lines) -> Array:
     """Mean square of each band (bands, readings)."""
     energy = np.add.reduceat(np.square(values.real) + np.square(values.imag), of.starts)
     return np.asarray(energy / counts(of)[:, None])
@@ -171,21 +182,21 @@ Shape = Callable[[float], ImportedChannel]  # a filter by the time (s) that it d
 
 
 def like(one: LoggerFilter) -> Shape:
-    """Filters of the type and order of one."""
-    return shape(one.type, one.order)
+    """Filters of the type, order and ripple of one."""
+    usual = ImportedChannel(replace(one, cutoff=1.0)).late
+    return lambda late: ImportedChannel(replace(one, cutoff=usual / late))
 
 
 def shape(kind: str, order: int) -> Shape:
     """Filters of a type and an order, or delays alone where the order is 0."""
     if order == 0:
         return lambda late: ImportedChannel(delay=late)
-    usual = ImportedChannel(LoggerFilter(kind, order, 1.0)).late
-    return lambda late: ImportedChannel(LoggerFilter(kind, order, usual / late))
+    return like(LoggerFilter(kind, order, 1.0))
 
 
-def mean(late: float) -> ImportedChannel:
-    """A mean over time that is late by some s."""
-    return ImportedChannel(average=2.0 * late)
+def means(times: int) -> Shape:
+    """Means of means over time, so many times."""
+    return lambda late: ImportedChannel(average=2.0 * late / times, means=times)
 
 
 ROUGH = (shape("", 0), *(shape(kind, USUAL) for kind in KINDS))
@@ -215,7 +226,7 @@ def likeliest(late: float, beyond: float, *of: ReadSpectra) -> ImportedChannel:
     low, high = LATES[max(0, place - 1)], LATES[min(place + 1, len(LATES) - 1)]
     alone, *filters = (
         closest(partial(surprises, of), one, low, high)
-        for one in (shape("", 0), mean, *itertools.starmap(shape, SHAPES))
+        for one in (shape("", 0), means(1), *itertools.starmap(shape, SHAPES))
     )
     best = min(filters, key=lambda item: item[1])
     return best[0] if best[1] < alone[1] - beyond else alone[0]

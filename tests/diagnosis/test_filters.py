@@ -49,7 +49,7 @@ def late(found: Record) -> list[float]:
     """By how much channels of a record are late, as far as filters and delays that were found say, s."""
     every = {
         *(one.about for one in found.late),
-        *(ImportedChannel(one).late for one in found.passed.values()),
+        *(one.late for one in found.passed.values()),
     }
     return sorted(every - {0.0})
 
@@ -269,7 +269,7 @@ def behind(whole: Record, seed: int) -> Record:
 def test_the_building_tells_the_filter_of_a_force_alone(cases: Cases) -> None:
     found = filters.filtered(behind(cases.record(duration=STRONGEST), 31))
     assert list(found.passed) == [(MASTER, "column_force")]
-    assert found.passed[MASTER, "column_force"].cutoff == pytest.approx(BESSEL.cutoff, rel=0.03)
+    assert found.passed[MASTER, "column_force"].filter.cutoff == pytest.approx(BESSEL.cutoff, rel=0.03)  # type: ignore[union-attr]
     view = logged_building.logged(Building(found))
     assert view is not None
     assert view.behind

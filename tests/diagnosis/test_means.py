@@ -55,8 +55,8 @@ def test_a_mean_of_a_wave_is_its_integral(length: float, frequency: float) -> No
 @pytest.mark.long
 def test_a_mean_of_which_nothing_is_stated_is_found_and_leaves_no_gap(cases: Cases) -> None:
     found = filters.filtered(imported(cases.record(), mean))
-    assert found.passed == {}
-    assert list(found.averaged.values()) == pytest.approx([LENGTH] * 6, rel=0.1)
+    assert all(one.filter is None for one in found.passed.values())
+    assert [one.average for one in found.passed.values()] == pytest.approx([LENGTH] * 6, rel=0.1)
     for lab in (lab_a(found), lab_b(found)):
         fit = fitting.fit(residuals.prepare(lab.logged(found.late), found), {})
         assert not worth.is_gap(settling.settled(fit))
@@ -73,7 +73,7 @@ def test_a_stated_delay_is_that_of_a_mean_where_readings_say_so(cases: Cases, av
     moved = {name: read(whole.signals[name]) for name in names}
     record = stated(replace(whole, signals=whole.signals | moved), 0.5 * LENGTH)
     found = means.averaged(record)
-    assert bool(found.averaged) == averages
+    assert bool(found.passed) == averages
 
     if averages:
         channel = found.stated.channel("slave", "damper_stroke")  # type: ignore[union-attr]
@@ -91,7 +91,9 @@ def test_series_are_brought_behind_a_mean_of_one_of_them() -> None:
 def test_the_building_is_judged_behind_the_mean_of_its_force(cases: Cases) -> None:
     whole = cases.record()
     read = whole.signals | {"column_force": mean(whole.signals["column_force"])}
-    record = replace(stated(whole, 0.0), signals=read, averaged={("master", "column_force"): LENGTH})
+    record = replace(
+        stated(whole, 0.0), signals=read, passed={("master", "column_force"): ImportedChannel(average=LENGTH)}
+    )
     plain = Building(record)
     assert plain.treated
     assert np.std(LoggedBuilding(plain, behind=True).left()) < 0.2 * np.std(LoggedBuilding(plain).left())

@@ -20,7 +20,8 @@ from diagnosis.fits import residuals
 from diagnosis.fits.fitting import fit
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
-from diagnosis.recorded.nuisances import LoggedReadings, through_logger
+from diagnosis.recorded.logger.through import through_logger
+from diagnosis.recorded.nuisances import LoggedReadings
 from diagnosis.recorded.record import NOT_LATE, Record
 from diagnosis.report.records import Report
 from diagnosis.signals.noise.level import white_rms

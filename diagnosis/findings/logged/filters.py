@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.recording.imported import NOTHING_STATED, ImportedChannel, LoggerFilter
+from common.recording.imported import NOTHING_STATED, ImportedChannel
 from common.roles import MASTER
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import LoggedBuilding
@@ -104,18 +104,7 @@ def filtered(record: Record) -> Record:
         forces, others = followed(others, forces, reading_forces), followed(forces, others, reading_others)
         forces, others = alike(forces, others)
     late = Late(Delay(forces.channel.delay), Delay(others.channel.delay))
-    return replace(record, passed=by_channel(forces, others), averaged=means(forces, others), late=late)
-
-
-def means(*found: Common) -> dict[tuple[str, str], float]:
-    """The times (s) over which channels have means, by topic and name."""
-    return {
-        (one.role, name): common.channel.average
-        for common in found
-        if common.channel.average
-        for one in common.by
-        for name in one.names
-    }
+    return replace(record, passed=by_channel(forces, others), late=late)
 
 
 def of_all(labs: Sequence[AlikeReadings]) -> ImportedChannel | None:
@@ -273,32 +262,34 @@ def passed(labs: Sequence[AlikeReadings], channel: ImportedChannel) -> Common:
     return Common(channel, tuple(labs)) if labs and not any(against) else Common()
 
 
-def by_channel(*found: Common) -> dict[tuple[str, str], LoggerFilter]:
-    """The filters by topic and name; channels of a laboratory that share one have the corner that all of them want."""
-    sharing: dict[tuple[str, LoggerFilter], list[AlikeReadings]] = {}
+def by_channel(*found: Common) -> dict[tuple[str, str], ImportedChannel]:
+    """What channels passed, by topic and name; those of a laboratory share the corner that all of them want."""
+    sharing: dict[tuple[str, ImportedChannel], list[AlikeReadings]] = {}
     for channel, one in ((common.channel, one) for common in found for one in common.by):
-        if channel.filter is not None:
-            sharing.setdefault((one.role, channel.filter), []).append(one)
-    result: dict[tuple[str, str], LoggerFilter] = {}
+        if channel.blunt:
+            sharing.setdefault((one.role, channel), []).append(one)
+    result: dict[tuple[str, str], ImportedChannel] = {}
     for (role, common), several in sharing.items():
         names = [(role, name) for one in several for name in one.names]
         result |= dict.fromkeys(names, tuned(several, common))
     return result
 
 
-def tuned(several: Sequence[AlikeReadings], common: LoggerFilter) -> LoggerFilter:
+def tuned(several: Sequence[AlikeReadings], common: ImportedChannel) -> ImportedChannel:
     """A filter with the corner that readings of a laboratory want, within what channels of a logger differ by.
 
-    Readings that would rather be late by more are late for another reason.
+    Readings that would rather be late by more are late for another reason. The time of a mean is the logger's.
     """
+    if common.filter is None:
+        return common
 
     def said(channel: ImportedChannel) -> float:
         return sum(low_pass.surprise(one.spectra, channel) for one in several)
 
-    late, of = ImportedChannel(common).late, low_pass.like(common)
+    late, of = common.late, low_pass.like(common.filter)
     best, least = low_pass.closest(said, of, max(late - 2.0 * ALIKE, 0.5 * late), late + 2.0 * ALIKE)
     near = abs(best.late - late) < ALIKE
-    return best.filter if best.filter and near and least < said(ImportedChannel(common)) - BEYOND else common
+    return best if near and least < said(common) - BEYOND else common
 
 
 def of_laboratories(

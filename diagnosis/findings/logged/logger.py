@@ -151,7 +151,8 @@ def passed(found: Diagnosis) -> list[str]:
     """A sentence for each kind of filter of the logger that the import map does not state."""
     alike: dict[tuple[str, int], dict[str, LoggerFilter]] = {}
     for (_, name), one in found.record.passed.items():
-        alike.setdefault((one.type, one.order), {})[name] = one
+        if one.filter is not None:
+            alike.setdefault((one.filter.type, one.filter.order), {})[name] = one.filter
     return [
         f"{' and '.join(those)} passed a low-pass filter of the data logger that the import map does not state: "
         f"about {kind.title()}, of order {order} and {span([one.cutoff for one in those.values()])} Hz, late by "

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from typing import TypeVar
 
 from common.recording.imported import NOTHING_STATED, ImportedChannel
 from diagnosis.findings.found import Diagnosis
@@ -18,6 +19,8 @@ from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import LEAST_TICKS, Record
 from diagnosis.signals import low_pass
 from diagnosis.signals.strength import BEYOND
+
+Common = TypeVar("Common")
 
 # Over the stated delay: some state the time to the middle of the last sample, others that of all of them.
 SHORTEST, LONGEST = 1.4, 2.8
@@ -40,7 +43,8 @@ def averaged(record: Record) -> Record:
     if least > surprise(NOTHING_STATED) - BEYOND:
         return record
     names = ((part.role, name) for part in labs for name in part.lab.kind.channels.names)
-    return replace(record, averaged={**record.averaged, **dict.fromkeys(names, mean.average)})
+    found = replace(mean, delay=0.0)
+    return replace(record, passed={**record.passed, **dict.fromkeys(names, found)})
 
 
 def without_delay(length: float) -> ImportedChannel:
@@ -50,16 +54,18 @@ def without_delay(length: float) -> ImportedChannel:
 
 def remarks(found: Diagnosis) -> list[str]:
     """A sentence for each time over which readings were taken for means."""
+    lengths = {name: (one.average, one.means) for name, one in found.record.passed.items() if one.average}
     return [
-        f"{' and '.join(names)} are means over {1e3 * length:.3g} ms, by what they have of fast motion, and the "
-        "import map does not state it. It was taken into account; state it as `average`."
-        for length, names in alike(found.record.averaged).items()
+        f"{' and '.join(names)} are {'means of ' * (times - 1)}means over {1e3 * length:.3g} ms, by what they have of "
+        "fast motion, and the import map does not state it. It was taken into account; state it as `average`"
+        f"{f' with `means = {times}`' if times > 1 else ''}."
+        for (length, times), names in alike(lengths).items()
     ]
 
 
-def alike(channels: Mapping[tuple[str, str], float]) -> dict[float, list[str]]:
+def alike(channels: Mapping[tuple[str, str], Common]) -> dict[Common, list[str]]:
     """The names of channels by what they have in common, from what each has by topic and name."""
-    names: dict[float, list[str]] = {}
+    names: dict[Common, list[str]] = {}
     for (_, name), value in channels.items():
         names.setdefault(value, []).append(name)
     return names

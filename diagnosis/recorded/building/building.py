@@ -78,7 +78,7 @@ class Building(Measured):
     @property
     def treated(self) -> bool:
         """Whether filters, means or delays of a logger differ between its motion, the ground's and the forces."""
-        return len({(one.filter, one.average, one.delay) for one in self.channels}) > 1
+        return len({(one.filter, one.average, one.means, one.delay) for one in self.channels}) > 1
 
     @property
     def ground(self) -> Array:

@@ -82,6 +82,9 @@ class SignalSource:
     average: float = key(
         "time up to its row over which each reading is a mean", default=0.0, least=0.0, unit="s"
     )
+    means: int = key(
+        "number of such means that follow one another, 3 in a sinc³ filter", default=1, least=1, most=8
+    )
     high_pass: float = key("corner of its amplifier's high-pass", default=0.0, least=0.0, unit="Hz")
     calibration: float = key("relative tolerance of its gain", default=0.0, least=0.0, most=1.0)
     offset: float = field(default=0.0, metadata=key("offset", default=0.0).metadata)
@@ -254,6 +257,8 @@ def source(path: Path, name: str, entry: Any, known: Known) -> SignalSource:
                 f"'{name}' in [signals] has both a unit and a scale: give one of them, or scale = -1 beside the unit "
                 "for a reading of the opposite sign."
             )
+        if "means" in values and not found.average:
+            raise PlanError(f"means of '{name}' in [signals] needs `average`, the time of one such mean.")
         scale = in_unit(found.unit, row, name) * found.scale if found.unit else found.scale
         step, low_pass = stated(apart, row, where)
         offset = as_type("float", apart.get("offset", 0.0), f"offset in [{where}]", row.unit)

@@ -362,6 +362,7 @@ def channel(
         rate=rate,
         first=first if between and not counted else 0.0,
         average=source.average,
+        means=source.means,
         delay_stated=source.delay_stated,
         followed=followed,
     )

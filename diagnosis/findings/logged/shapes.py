@@ -1,0 +1,354 @@
+"""The shape of a filter that readings of a data logger passed, where the import map states a delay at most.
+
+Slow motion tells by how much a filter delays. Which filter it is shows in what is fast: up to half the rate of the
+ticks, and in what a machine does between them after each step of its command, which a filter smooths and a delay does
+not. So each shape is weighed by all of that, with the nominal models at their best behind it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from common.recording.imported import NOTHING_STATED, RIPPLING, ImportedChannel, LoggerFilter
+from diagnosis.findings.logged.filters import ANY_GAIN, AS_LIKELY, SPOILT, longest
+from diagnosis.findings.sensors import readings
+from diagnosis.fits import fitting, hypothesis, residuals
+from diagnosis.fits.fitting import Fit
+from diagnosis.fits.threads import each
+from diagnosis.recorded.divided import parts_of
+from diagnosis.recorded.laboratory import RecordedLaboratory
+from diagnosis.recorded.nuisances import ALIKE, LoggedReadings, channels
+from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.recorded.record import LEAST_TICKS, Delay, Record
+from diagnosis.signals import low_pass
+from diagnosis.signals.low_pass import ReadSpectra, Shape
+from diagnosis.signals.mask import Mask
+from diagnosis.signals.strength import BEYOND
+from models.registry import Array
+
+# Filters usual before converters: analogue ones, of switched capacitors with a ripple, and means of means in a
+# converter of sigma-delta type.
+FILTERS = (
+    *(LoggerFilter("butterworth", order, 1.0) for order in (1, 2, 3, 4, 6, 8)),
+    *(LoggerFilter("bessel", order, 1.0) for order in (2, 3, 4, 6, 8)),
+    *(LoggerFilter("chebyshev", order, 1.0, 0.5) for order in (3, 4, 5, 6, 8)),
+    *(LoggerFilter("elliptic", order, 1.0, 0.1, 60.0) for order in (4, 6, 8)),
+)
+SHAPES = (*map(low_pass.like, FILTERS), low_pass.means(1), low_pass.means(3))
+# Over the delay by which a filter was found, of another one: the nominal models may be late or early themselves.
+LEAST, MOST = 0.5, 1.8
+NYQUIST, ROWS = 0.49, 0.45  # of the rate of the ticks, and of rows that were interpolated, highest frequency
+BANDS = 24
+REACH = 25  # ticks beside missing rows, which count for no shape
+LOOSE = 10.0  # tolerances of the plan's parameters, in which a machine may be at fault
+SHOWN = 2  # readings that must show a filter where no delay is known
+FAMILIES = 4  # of shapes, of which the likeliest is judged by all that was read
+ROUNDS = 2  # of looking for a shape, each about nominal models at their best behind the one before it
+
+
+Name = tuple[str, str]  # topic and name of a reading
+
+
+class Group(NamedTuple):
+    """Readings behind one filter, mean or delay of a logger."""
+
+    names: frozenset[Name]
+    channel: ImportedChannel
+    free: bool  # whether the import map states no delay
+
+    def tried(self, record: Record, channel: ImportedChannel) -> Record:
+        """The record with these readings behind another one."""
+        passed = {name: one for name, one in record.passed.items() if name not in self.names}
+        if channel.blunt:
+            passed |= dict.fromkeys(self.names, replace(channel, delay=0.0))
+        late = record.late
+        if self.free:
+            signals = {named: signal for lab in record.labs for named, signal in signals_of(lab)}
+            kinds = {force(record, signals[name]) for name in self.names}
+            late = late._replace(**{"force" if kind else "motion": Delay(channel.delay) for kind in kinds})
+        return replace(record, passed=passed, late=late)
+
+
+class Judged(NamedTuple):
+    """How well a record is told by the nominal models of its laboratories at their best."""
+
+    record: Record
+    fits: list[tuple[LaboratoryPart, Fit]]
+    of: dict[Name, float]  # −2·log of how probable each reading is, up to a constant
+    missed: dict[Name, float]  # share of each reading's rms that its model leaves
+
+    def surprise(self, counted: Iterable[Name]) -> float:
+        """−2·log of how probable those readings and the nominal parameters are, up to a constant."""
+        return sum(self.of[name] for name in counted) + sum(fit.prior for _, fit in self.fits)
+
+    def far_likelier(self, other: Judged, counted: Collection[Name]) -> bool:
+        """Whether the readings are far likelier than in another one, and none is much less likely.
+
+        A reading may lose a part of what all gain, as nominal parameters follow them all.
+        """
+        gain = other.surprise(counted) - self.surprise(counted)
+        lost = max(self.of[name] - other.of[name] for name in counted)
+        return gain > BEYOND and lost < max(BEYOND, AS_LIKELY * gain)
+
+    def told(self, names: Iterable[Name]) -> set[Name]:
+        """Those of the readings that their models tell, or all of them where they tell none."""
+        return {name for name in names if self.missed.get(name, 1.0) < SPOILT} or set(names)
+
+
+def shaped(record: Record) -> Record:
+    """An imported record with the likeliest shape of what its readings passed, where the map does not state it."""
+    if record.stated is None or record.static or record.ticks < LEAST_TICKS:
+        return record
+    found, there = groups(record), known(record)
+    if not any(group.free for group in found):
+        record = anew(record, there)
+    for group in found:
+        record = reshaped(record, group, there)
+    return united(record, there)
+
+
+def anew(record: Record, there: Mapping[Name, Mask]) -> Record:
+    """The record with all readings of which nothing is stated behind a filter, where two of them show it.
+
+    They must show it far better than a delay, which may be one of the machine. A converter that takes off the delay of
+    its own filter leaves no trace but that nothing is faster than the ticks, which is no fault of any machine.
+    """
+    names = unstated(record) & there.keys()
+    now = judged(record, there)
+    counted = now.told(names)
+    if not counted:
+        return record
+    spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
+    group = Group(frozenset(names), replace(NOTHING_STATED, delay=low_pass.roughly(*spectra).late), free=True)
+    ended = judged(group.tried(record, smooth(0.0)), there)
+    tried = {one: judged(group.tried(record, one), there) for one in likeliest(spectra, group)}
+    channel = min(tried, key=lambda one: tried[one].surprise(counted))
+    found, late = tried[channel], judged(group.tried(record, bare(NOTHING_STATED, channel.late)), there)
+    others = [now, late, ended, judged(record, there, LOOSE)]
+    shown = sum(min(now.of[name], late.of[name]) > found.of[name] + BEYOND for name in counted)
+    if shown >= SHOWN and all(found.far_likelier(one, counted) for one in others):
+        return found.record
+    return ended.record if ended.far_likelier(now, counted) else record
+
+
+def united(record: Record, there: Mapping[Name, Mask]) -> Record:
+    """The record with all readings of which nothing is stated behind what some of them passed, where that is likelier.
+
+    Loggers mostly treat all channels alike.
+    """
+    names, found = unstated(record) & there.keys(), [group for group in groups(record) if group.free]
+    if not found or found[0].names == names:
+        return record
+    now = judged(record, there)
+    counted = now.told(names)
+    every = Group(frozenset(names), NOTHING_STATED, free=True)
+    tried = [judged(every.tried(record, group.channel), there) for group in found]
+    return min([now, *tried], key=lambda one: one.surprise(counted)).record
+
+
+def unstated(record: Record) -> set[Name]:
+    """The readings of laboratories of whose logger the import map states nothing."""
+    labs = [lab for lab in laboratories(record) if lab.free]
+    pairs = [pair for lab in labs for pair in zip(named(lab), lab.signals, strict=True)]
+    return {name for name, signal in pairs if record.has(signal)}
+
+
+def groups(record: Record) -> list[Group]:
+    """Readings that come late behind something of which no more than a delay is stated.
+
+    Those are one group that are behind filters of one type and order, or come late by the same delay.
+    """
+    found: dict[tuple[bool, str, int, float], dict[Name, ImportedChannel]] = {}
+    for lab in laboratories(record):
+        mapped = channels(record.mapped, lab.lab)
+        for name, signal, said, now in zip(named(lab), lab.signals, mapped, lab.channels, strict=True):
+            if said.filter or said.average or not record.has(signal):
+                continue
+            late = record.late.force if force(record, signal) else record.late.motion
+            channel = bare(now, late.about if lab.free else now.delay)
+            if channel.late > 0.0:
+                kind = (channel.filter.type, channel.filter.order) if channel.filter else ("", 0)
+                alone = 0.0 if channel.filter else channel.late
+                found.setdefault((lab.free, *kind, alone), {})[name] = channel
+    return [
+        Group(frozenset(those), next(iter(those.values())), key[0]) for key, those in found.items() if those
+    ]
+
+
+def reshaped(record: Record, group: Group, there: Mapping[Name, Mask]) -> Record:
+    """The record with readings of a group behind the likeliest shape, if that is likelier than what is known.
+
+    Where no more than a delay is known, a shape must be far likelier, also than machines far from their plan.
+    """
+    now = judged(record, there)
+    counted = now.told(group.names & there.keys())
+    for _ in range(ROUNDS if counted else 0):
+        spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
+        shapes = [*likeliest(spectra, group), bare(NOTHING_STATED, group.channel.late)]
+        tried = {one: judged(group.tried(record, one), there) for one in shapes}
+        channel = min(tried, key=lambda one: tried[one].surprise(counted))
+        found = tried[channel]
+        if found.surprise(counted) >= now.surprise(counted):
+            break
+        if channel.blunt and not group.channel.blunt:
+            loose = judged(group.tried(record, smooth(group.channel.late)), there, LOOSE)
+            if not all(found.far_likelier(one, counted) for one in (now, loose)):
+                break
+        done = not found.far_likelier(now, counted)
+        record, now, group = found.record, found, group._replace(channel=channel)
+        if done:
+            break
+    return record
+
+
+def likeliest(spectra: Sequence[ReadSpectra], group: Group) -> list[ImportedChannel]:
+    """The filters and means of several families behind which readings are least surprising, the likeliest first.
+
+    They are late by about as much as what is known, and by just as much where that is stated. A filter may be without
+    a trace but that it lets nothing pass which is faster than the ticks.
+    """
+    said = partial(low_pass.surprises, spectra)
+    late = group.channel.late
+
+    def closest(shape: Shape) -> tuple[ImportedChannel, float]:
+        if group.free:
+            return low_pass.closest(said, shape, LEAST * late, MOST * late)
+        return (channel := shape(late)), said(channel)
+
+    families: dict[str, ImportedChannel] = {}
+    for channel, _ in sorted(each(closest, [*SHAPES, smooth]), key=lambda item: item[1]):
+        families.setdefault(family(channel), channel)
+    return list(families.values())[:FAMILIES]
+
+
+def family(channel: ImportedChannel) -> str:
+    """What a filter or mean has in common with others that pass slow motion nearly alike."""
+    if channel.filter is None:
+        return "smooth" if channel.smooth else "means"
+    if channel.filter.order == 1:
+        return "first order"
+    return "rippling" if channel.filter.type in RIPPLING else channel.filter.type
+
+
+def bare(channel: ImportedChannel, late: float) -> ImportedChannel:
+    """The filter and mean of a channel with a delay (s) and nothing else."""
+    return replace(
+        NOTHING_STATED,
+        filter=channel.filter,
+        average=channel.average,
+        means=channel.means,
+        smooth=channel.smooth,
+        delay=late,
+    )
+
+
+def smooth(late: float) -> ImportedChannel:
+    """A filter that delays by some s, and passes nothing that is faster than the ticks."""
+    return ImportedChannel(delay=late, smooth=True)
+
+
+def judged(record: Record, there: Mapping[Name, Mask], loose: float = 1.0) -> Judged:
+    """A record with the nominal models of its laboratories at their best, by what is `there` (ticks,) of each reading.
+
+    The same ticks count behind every shape. The plan's parameters have `loose` times their tolerances.
+    """
+    steps, interval = readings.resolutions(record, {}), record.plan.test.interval
+    result = Judged(record, [], {}, {})
+    for lab in (loosened(lab, loose).logged(record.late) for lab in laboratories(record)):
+        fit = fitting.fit(residuals.prepare(lab, record, steps), {})
+        result.fits.append((lab, fit))
+        columns = zip(named(lab), lab.measured.T, predicted(lab, fit).T, strict=True)
+        for name, *pair in (row for row in columns if row[0] in there):
+            read, said = ((values * there[name])[:, None] for values in pair)
+            looked = low_pass.spectra(read, said, np.zeros((*read.shape, 0)), interval, highest(lab), BANDS)
+            result.of[name] = low_pass.surprise_as_is(looked)
+            result.missed[name] = float(np.std(read - said) / np.std(read))
+    return result
+
+
+def loosened(lab: LaboratoryPart, times: float) -> LaboratoryPart:
+    """A laboratory whose parameters have so many times their tolerances."""
+    return lab.replaced(
+        nuisances=tuple(replace(one, tolerance=times * one.tolerance) for one in lab.nuisances)
+    )
+
+
+def known(record: Record) -> dict[Name, Mask]:
+    """Where each reading that was recorded and moves is present (ticks,), by topic and name."""
+    found = {}
+    for lab in laboratories(record):
+        for name, signal, read, there in zip(
+            named(lab), lab.signals, lab.measured.T, lab.present.T, strict=True
+        ):
+            if record.has(signal) and there.any() and np.ptp(read[there]) > 0.0:
+                found[name] = ndimage.binary_erosion(there, np.ones(2 * REACH + 1), border_value=1)
+    return found
+
+
+def predicted(lab: LaboratoryPart, fit: Fit) -> Array:
+    """Readings of a laboratory (ticks, signals) by a fit."""
+    return lab.predict(hypothesis.lay(fit.data, fit.z, fit.values))
+
+
+def spectra_of(lab: LaboratoryPart, fit: Fit, record: Record, counted: Iterable[Name]) -> ReadSpectra | None:
+    """Spectra of those readings of a laboratory that count, about a fit of its nominal model and before any filter."""
+    own = [place for place, name in enumerate(named(lab)) if name in counted and place != lab.freed]
+    stretch = longest(np.all(lab.present[:, own], axis=1))
+    if not own or stretch.stop - stretch.start < LEAST_TICKS:
+        return None
+    before = lab.replaced(
+        channels=tuple(replace(one, filter=None, average=0.0, delay=0.0, smooth=True) for one in lab.channels)
+    )
+    interval, system = record.plan.test.interval, record.systems[lab.role]
+    movable = [one for one in lab.nuisances if not isinstance(one, LoggedReadings)]
+    for one, z in zip(movable, fit.z, strict=False):
+        system = one.moved(system, float(z))
+    true = before.predict(system)[:, own]
+    slopes = [before.predict(one.moved(system, 1.0))[:, own] - true for one in movable]
+    slopes += [ANY_GAIN * true * (np.arange(len(own)) == place) for place in range(len(own))]
+    forces = np.array([force(record, lab.signals[place]) for place in own])
+    rates = ALIKE * np.gradient(true, interval, axis=0)
+    slopes += [-rates * kind for kind in (forces, ~forces)]
+    found = low_pass.spectra(
+        lab.measured[stretch][:, own],
+        true[stretch],
+        np.stack(slopes, axis=2)[stretch],
+        interval,
+        highest(lab),
+        BANDS,
+    )
+    return found._replace(rounds=1)
+
+
+def highest(lab: LaboratoryPart) -> float:
+    """The highest frequency (Hz) at which a laboratory's readings tell of a filter."""
+    rows = [one.rate for one in lab.channels if one.interpolated and one.rate > 0.0]
+    return min(NYQUIST / lab.interval, *(ROWS * rate for rate in rows), math.inf)
+
+
+def laboratories(record: Record) -> list[LaboratoryPart]:
+    """The laboratories of a record with enough ticks without missing rows."""
+    parts = [part for part in parts_of(record) if isinstance(part, LaboratoryPart)]
+    return [part for part in parts if part.present.any()]
+
+
+def signals_of(lab: RecordedLaboratory) -> list[tuple[Name, str]]:
+    """Topic and name of a laboratory's readings, each with its signal in the record."""
+    return [((lab.role, name), lab.signal(name)) for name in lab.kind.channels.names]
+
+
+def named(lab: LaboratoryPart) -> list[Name]:
+    """Topic and name of a laboratory's readings."""
+    return [(lab.role, name) for name in lab.lab.kind.channels.names]
+
+
+def force(record: Record, signal: str) -> bool:
+    """Whether a reading measures a force."""
+    return record.unit(signal) == "N"
