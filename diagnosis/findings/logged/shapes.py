@@ -185,25 +185,26 @@ def groups(record: Record) -> list[Group]:
 def reshaped(record: Record, group: Group, there: Mapping[Name, Mask]) -> Record:
     """The record with readings of a group behind the likeliest shape, if that is likelier than what is known.
 
-    Where no more than a delay is known, a shape must be far likelier, also than machines far from their plan.
+    Where no more than a delay is known, it must be far likelier. Beside a delay that is stated, a filter that takes
+    away slow motion must be far likelier than machines far from their plan, which may do so too.
     """
     now = judged(record, there)
     counted = now.told(group.names & there.keys())
     for _ in range(ROUNDS if counted else 0):
         spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
-        shapes = [*likeliest(spectra, group), bare(NOTHING_STATED, group.channel.late)]
+        late = group.channel.late
+        shapes = dict.fromkeys([*likeliest(spectra, group), smooth(late), bare(NOTHING_STATED, late)])
         tried = {one: judged(group.tried(record, one), there) for one in shapes}
         channel = min(tried, key=lambda one: tried[one].surprise(counted))
+        if not group.free and channel.late > channel.delay:
+            loose = judged(group.tried(record, smooth(late)), there, LOOSE)
+            channel = channel if tried[channel].far_likelier(loose, counted) else smooth(late)
         found = tried[channel]
-        if found.surprise(counted) >= now.surprise(counted):
+        sure = found.far_likelier(now, counted)
+        if not (sure or (group.channel.blunt and found.surprise(counted) < now.surprise(counted))):
             break
-        if channel.blunt and not group.channel.blunt:
-            loose = judged(group.tried(record, smooth(group.channel.late)), there, LOOSE)
-            if not all(found.far_likelier(one, counted) for one in (now, loose)):
-                break
-        done = not found.far_likelier(now, counted)
         record, now, group = found.record, found, group._replace(channel=channel)
-        if done:
+        if not sure:
             break
     return record
 
