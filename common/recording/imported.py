@@ -116,6 +116,9 @@ class ImportedChannel:
     followed: bool = False  # whether it is the plan's own motion between the ticks that its rows showed
     means: int = 1  # how many such means follow one another: three in a converter with a sinc³ filter
     smooth: bool = False  # whether a filter without any other trace took away what is faster than the ticks
+    at_ticks: bool = (
+        False  # whether its filter or mean was given the readings at the ticks alone, as a digital one
+    )
 
     @property
     def blunt(self) -> bool:
@@ -204,6 +207,11 @@ class ImportedData:
             said, filter=one.filter, average=one.average, means=one.means, smooth=one.smooth, delay=delay
         )
         return replace(self, channels={**self.channels, topic: {**self.channels.get(topic, {}), name: found}})
+
+    def given_ticks(self, topic: str, name: str) -> ImportedData:
+        """The same with a signal's channel whose filter was given the readings at the ticks alone."""
+        rows = {**self.channels.get(topic, {}), name: replace(self.channel(topic, name), at_ticks=True)}
+        return replace(self, channels={**self.channels, topic: rows})
 
     def with_delay(self, topic: str, name: str, delay: float) -> ImportedData:
         """The same with a signal's channel that is later by some s."""

@@ -105,6 +105,8 @@ class Record:
     late: Late = NOT_LATE  # by which a logger delays all channels of a kind
     # filters and means of channels that its import map does not state, by topic and name
     passed: Mapping[tuple[str, str], ImportedChannel] = field(default_factory=dict)
+    # channels whose filter or mean was given the readings at the ticks alone, by topic and name
+    at_ticks: frozenset[tuple[str, str]] = frozenset()
     # s, by which channels are late beside filters that the map states, by topic and name
     delayed: Mapping[tuple[str, str], float] = field(default_factory=dict)
     worked_out: tuple[str, ...] = ()  # commands that were not recorded and follow from what was
@@ -120,6 +122,8 @@ class Record:
         said = self.mapped
         for (topic, name), one in self.passed.items():
             said = said and said.behind(topic, name, one)
+        for topic, name in sorted(self.at_ticks):
+            said = said and said.given_ticks(topic, name)
         for (topic, name), delay in self.delayed.items():
             said = said and said.with_delay(topic, name, delay)
         return said

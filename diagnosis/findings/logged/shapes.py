@@ -111,7 +111,25 @@ def shaped(record: Record) -> Record:
         record = anew(record, there)
     for group in found:
         record = reshaped(record, group, there)
-    return united(record, there)
+    return sampled(united(record, there), there)
+
+
+def sampled(record: Record, there: Mapping[Name, Mask]) -> Record:
+    """The record with filters and means, stated or found, that were given the readings at the ticks alone.
+
+    So a controller filters its own readings. What machines do between ticks tells.
+    """
+    behind = {
+        name
+        for lab in laboratories(record)
+        for name, channel in zip(named(lab), lab.channels, strict=True)
+        if (channel.filter or channel.average) and not channel.interpolated
+    }
+    if not behind & there.keys():
+        return record
+    now, other = (judged(one, there) for one in (record, replace(record, at_ticks=frozenset(behind))))
+    counted = now.told(behind & there.keys())
+    return other.record if other.far_likelier(now, counted) else record
 
 
 def anew(record: Record, there: Mapping[Name, Mask]) -> Record:

@@ -50,7 +50,7 @@ class Finer:
         ):
             made = system.effects.sensors.get(name, SensorEffects())
             late = channel.delay + made.logger_delay
-            if channel.blunt or channel.between or late != 0.0:
+            if not channel.at_ticks and (channel.blunt or channel.between or late != 0.0):
                 step, share = divmod(late / AS_LATE, 1.0)
                 result[:, place] = self.at(place, int(step))
                 if share > 0.0:

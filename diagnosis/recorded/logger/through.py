@@ -30,8 +30,7 @@ def through_logger(
     made = [system.effects.sensors.get(name) for name in lab.kind.channels.names]
     later = [one.logger_delay if one else 0.0 for one in made]
     places = [
-        None if channel.blunt else 0.0 if channel.between else (-(channel.delay + more) / interval) % 1.0
-        for channel, more in zip(stated, later, strict=True)
+        place(channel, channel.delay + more, interval) for channel, more in zip(stated, later, strict=True)
     ]
     result = readings
     if drive and any(place != 0.0 for place in places):
@@ -41,3 +40,10 @@ def through_logger(
         if channel.filter or channel.average or channel.high_pass or channel.delay + more:
             result[:, number] = channel.through(result[:, number], interval, more)
     return result
+
+
+def place(channel: ImportedChannel, late: float, interval: float) -> float | None:
+    """Where between two ticks, from 0 to 1, a channel that is `late` (s) was read; None for one behind a filter."""
+    if channel.at_ticks or channel.between:
+        return 0.0
+    return None if channel.blunt else (-late / interval) % 1.0
