@@ -18,6 +18,7 @@ BLOCKS = 12  # of a recording, by which the error of a rate is told
 SURE, ALONE = 6.0, 4.0  # standard errors of a common rate, and of the rate that each laboratory says
 USUALLY_SURE, USUALLY_ALONE = 4.0, 2.0  # the same of a rate up to `QUARTZ`, which needs less to be believed
 QUARTZ = 6e-5  # of a rate: what a quartz errs by at most as a rule
+AT_LEAST = 2  # readings of a laboratory by itself
 MOST = 1e-3  # of a rate: a quartz errs by less than a tenth of it
 TAPS = 16  # samples on each side of an interpolation
 KAISER = 8.0  # shape of its window: errors below 1e-4 up to three quarters of the highest frequency
@@ -59,10 +60,15 @@ def rate(measured: Array, predicted: Array, there: Mask, interval: float) -> Rat
 def common(laboratories: Sequence[Sequence[Rate]]) -> float:
     """The rate that the readings of several laboratories agree on, 0 where they do not, or say nothing for sure.
 
+    Those of one laboratory by itself, of which there must be several, tell no more than the rate of a quartz: no
+    machine slows down so little and so evenly, and if one did it would be within its tolerances.
+
     A nominal model that errs moves each reading's rate by more than its blocks of time show. So where rates scatter by
     more than their errors, all errors are larger by as much, as in R. T. Birge, Physical Review 40 (1932), 207-227.
     """
-    if sum(map(bool, laboratories)) < 2:
+    there = [rates for rates in laboratories if rates]
+    single = there[0] if len(there) == 1 else []
+    if not there or (single and len(single) < AT_LEAST):
         return 0.0
     larger = scatter([one for rates in laboratories for one in rates])
     known = [[Rate(one.fast, larger * one.error) for one in rates] for rates in laboratories if rates]
@@ -70,7 +76,9 @@ def common(laboratories: Sequence[Sequence[Rate]]) -> float:
     every = [one for rates in known for one in rates]
     found = together(every)
     usual = abs(found.fast) < QUARTZ
-    least, least_alone = (USUALLY_SURE, USUALLY_ALONE) if usual else (SURE, ALONE)
+    least, least_alone = (USUALLY_SURE, USUALLY_ALONE) if usual and not single else (SURE, ALONE)
+    if single and not (usual and all(one.fast * found.fast > 0.0 for one in known[0])):
+        return 0.0
     sure = abs(found.fast) > least * found.error and abs(found.fast) < MOST
     alone = all(one.fast * found.fast > 0.0 and abs(one.fast) > least_alone * one.error for one in said)
     agree = all(abs(one.fast - found.fast) < ALONE * np.hypot(one.error, found.error) for one in every)

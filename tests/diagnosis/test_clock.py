@@ -58,7 +58,11 @@ def test_only_laboratories_that_agree_tell_a_rate() -> None:
     sure, other = clock.Rate(FAST, 2e-6), clock.Rate(-FAST, 2e-6)
     unsure = clock.Rate(0.0, 1e-3)
     assert clock.common([[sure, unsure], [sure]]) == pytest.approx(FAST, rel=0.01)
-    assert clock.common([[sure, sure]]) == 0.0
+    assert clock.common([[sure, sure]]) == pytest.approx(FAST, rel=0.01)
+    assert clock.common([[sure], []]) == 0.0
+    assert clock.common([[sure, clock.Rate(-1e-6, 1e-4)]]) == 0.0
+    assert clock.common([[clock.Rate(FAST, 1e-5), clock.Rate(FAST, 5e-5)]]) == 0.0
+    assert clock.common([[clock.Rate(8e-5, 2e-6), clock.Rate(8e-5, 2e-6)]]) == 0.0
     assert clock.common([[sure], [other]]) == 0.0
     assert clock.common([[sure], [unsure]]) == 0.0
     assert clock.common([[sure, other], [sure]]) == 0.0

@@ -25,7 +25,7 @@ from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Delay, Late, Record
 from diagnosis.signals import low_pass
 from diagnosis.signals.low_pass import ReadSpectra
-from diagnosis.signals.mask import Mask
+from diagnosis.signals.mask import longest
 from diagnosis.signals.strength import BEYOND
 
 # Share of a reading's rms that a nominal model leaves, from which on an effect is at work: noise, a hum of 1 % of the
@@ -321,16 +321,6 @@ def of_laboratory(record: Record, part: LaboratoryPart, *, force: bool | None) -
     interval, read = record.plan.test.interval, part.measured[known][:, places]
     spectra = low_pass.spectra(read, true, np.stack(slopes, axis=2), interval)
     return AlikeReadings(part.role, tuple(there.values()), spectra)
-
-
-def longest(known: Mask) -> slice:
-    """The longest stretch of ticks (ticks,) at which something is known."""
-    ends = np.flatnonzero(np.diff(np.r_[False, known, False].astype(int)))
-    begins, behind = ends[::2], ends[1::2]
-    if not begins.size:
-        return slice(0)
-    place = int(np.argmax(behind - begins))
-    return slice(int(begins[place]), int(behind[place]))
 
 
 def of_building(record: Record, parts: Sequence[Part]) -> list[AlikeReadings]:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy import ndimage
 
 from common.recording.imported import NOTHING_STATED, RIPPLING, ImportedChannel, LoggerFilter
-from diagnosis.findings.logged.filters import ANY_GAIN, AS_LIKELY, SPOILT, longest
+from diagnosis.findings.logged.filters import ANY_GAIN, AS_LIKELY, SPOILT
 from diagnosis.findings.sensors import readings
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
@@ -29,7 +29,7 @@ from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import LEAST_TICKS, Delay, Record
 from diagnosis.signals import low_pass
 from diagnosis.signals.low_pass import ReadSpectra, Shape
-from diagnosis.signals.mask import Mask
+from diagnosis.signals.mask import Mask, longest
 from diagnosis.signals.strength import BEYOND
 from models.registry import Array
 
@@ -106,10 +106,10 @@ def shaped(record: Record) -> Record:
     """An imported record with the likeliest shape of what its readings passed, where the map does not state it."""
     if record.stated is None or record.static or record.ticks < LEAST_TICKS:
         return record
-    found, there = groups(record), known(record)
-    if not any(group.free for group in found):
+    there = known(record)
+    if not any(group.free for group in groups(record)):
         record = anew(record, there)
-    for group in found:
+    for group in groups(record):
         record = reshaped(record, group, there)
     return sampled(united(record, there), there)
 
@@ -133,10 +133,11 @@ def sampled(record: Record, there: Mapping[Name, Mask]) -> Record:
 
 
 def anew(record: Record, there: Mapping[Name, Mask]) -> Record:
-    """The record with all readings of which nothing is stated behind a filter, where two of them show it.
+    """The record with all readings of which nothing is stated behind a filter, where two of them are likelier.
 
-    They must show it far better than a delay, which may be one of the machine. A converter that takes off the delay of
-    its own filter leaves no trace but that nothing is faster than the ticks, which is no fault of any machine.
+    All together must be far likelier than behind a delay, which may be one of the machine. A converter that takes off
+    the delay of its own filter leaves no trace but that nothing is faster than the ticks, which is no fault of any
+    machine.
     """
     names = unstated(record) & there.keys()
     now = judged(record, there)
@@ -150,7 +151,7 @@ def anew(record: Record, there: Mapping[Name, Mask]) -> Record:
     channel = min(tried, key=lambda one: tried[one].surprise(counted))
     found, late = tried[channel], judged(group.tried(record, bare(NOTHING_STATED, channel.late)), there)
     others = [now, late, ended, judged(record, there, LOOSE)]
-    shown = sum(min(now.of[name], late.of[name]) > found.of[name] + BEYOND for name in counted)
+    shown = sum(now.of[name] > found.of[name] + BEYOND for name in counted)
     if shown >= SHOWN and all(found.far_likelier(one, counted) for one in others):
         return found.record
     return ended.record if ended.far_likelier(now, counted) else record

@@ -14,6 +14,7 @@ from diagnosis.recorded.nuisances import ALIKE, CALIBRATED, LATE, UNLIKE, Logged
 from diagnosis.recorded.record import LEAST_TICKS, Delay
 from diagnosis.signals import alike, low_pass
 from diagnosis.signals.earlier import earlier
+from diagnosis.signals.mask import longest
 from diagnosis.signals.strength import BEYOND
 from loop.nominal import partition
 from models.registry import Array
@@ -29,6 +30,7 @@ SMOOTHED = (
 STEADY = 0.3  # of the noise of a force, by which its zero may be off and drift to either side, unseen
 BEFORE = 0.75  # share of what stated filters change, from which on they lie before the master
 SURE = 3.0  # standard deviations from which on a stated filter is taken to lie before the master
+OF_DIFFERENCES = 70.0  # Σ of the squared weights of fourth differences
 SLOPES = 2  # ticks to either side that the slopes and bends of a displacement take in
 
 
@@ -62,7 +64,13 @@ def before_master(plain: Array, behind: Array) -> bool:
 def white_noise(values: Array) -> float:
     """Mean square of what is white in values (ticks, storeys), by fourth differences, over all storeys."""
     apart = 1.4826 * np.median(np.abs(np.diff(values, n=4, axis=0)), axis=0)
-    return float(np.sum(np.square(apart))) / 70.0
+    return float(np.sum(np.square(apart))) / OF_DIFFERENCES
+
+
+def summed(values: Array, size: int) -> Array:
+    """Sums of so many rows (rows, storeys) each, over the root of their number: those of white noise have its level."""
+    rows = len(values) // size
+    return np.asarray(values[: rows * size].reshape(rows, size, -1).sum(axis=1) / math.sqrt(size))
 
 
 def within_tolerances(left: Array, slopes: Array, usual: float) -> Array:
@@ -97,7 +105,6 @@ class LoggedBuilding(Building):
     def __init__(self, of: Building, *, behind: bool = False) -> None:
         self.__dict__.update(of.__dict__)
         self.behind = behind
-        moved = white_noise(self.balance(System(self._plan), self.motion))
         if behind:
             self.pass_alike()
         plan = self._plan
@@ -122,30 +129,34 @@ class LoggedBuilding(Building):
         whole = bool(of.present.all()) and len(self.measured) >= LEAST_TICKS
         if of.linear and not behind and whole and len(self.sources) > 1:
             self.alone = self.delayed_alone()
-        if whole:
-            self.of_motion = self.noise_of_motion(moved)
+        stretch = longest(np.all(self.present, axis=1))
+        if stretch.stop - stretch.start >= LEAST_TICKS:
+            self.of_motion = self.noise_of_motion(stretch)
 
-    def noise_of_motion(self, moved: float) -> float:
-        """The share of what the balance leaves that is noise of the motion, of which `moved` is the mean square, N².
+    def noise_of_motion(self, stretch: slice) -> float:
+        """The share of what the balance leaves that is noise of the motion.
 
-        It is that of averages over a twelfth of the shortest period, less what nominal parameters make up for. Noise of
-        the log may have any colour, while that of the motion is taken for white. Noise that the log has as well leaves
-        nothing, by what is left of it at the highest frequencies.
+        A stretch without missing rows tells it. It is that of averages over a twelfth of the shortest period, less what
+        nominal parameters make up for. Noise of the log may have any colour, while that of the motion is taken for
+        white. Noise that the log has as well leaves nothing, by what is left of it at the highest frequencies.
         """
-        size = max(1, min(round(self.shortest / (PER_PERIOD * self._interval)), len(self.measured) // FEWEST))
+        ticks = stretch.stop - stretch.start
+        size = max(1, min(round(self.shortest / (PER_PERIOD * self._interval)), ticks // FEWEST))
         system = System(self._plan)
         systems = [system, *(one.moved(system, 1.0) for one in self.nuisances)]
-        left = np.stack([self.left(one) for one in systems])[:, : len(self.measured) // size * size]
+        left = np.stack([self.left(one)[stretch] for one in systems])[:, : ticks // size * size]
         sums = left.reshape(len(systems), -1, size, left.shape[2]).sum(axis=2) / math.sqrt(size)
         rest, *others = sums.reshape(len(systems), -1)
         if others:
             usual = math.sqrt(white_noise(sums[0]) / sums.shape[2])
             rest = rest - within_tolerances(rest, np.stack(others, axis=1) - rest[:, None], usual)
         level = float(np.mean(np.square(rest))) * left.shape[2]
-        fast, noise = (np.diff(x, n=4, axis=0)[::5].ravel() for x in (self.left(), self.measured))
-        energy = float(noise @ noise)
-        apart = max(0.0, float(fast @ noise) / energy) if energy > 0.0 else 0.0
-        return min(1.0, apart * moved / level) if level > 0.0 else 0.0
+        fastest = max(1, math.ceil(0.5 / (self._interval * float(np.min(self.passes)))))
+        rest, motion = (
+            np.diff(summed(x[stretch], fastest), n=4, axis=0)[::5] for x in (self.left(), self.measured)
+        )
+        shared = float(np.sum(np.mean(rest * motion, axis=0))) / OF_DIFFERENCES
+        return float(np.clip(shared / level, 0.0, 1.0)) if level > 0.0 else 0.0
 
     def delayed_alone(self) -> bool:
         """Whether what was recorded of the other forces is what the master used, and only the own one is delayed."""
