@@ -191,14 +191,6 @@ class Kind(ABC):
         """
         return 0.0
 
-    def apart(self, system: System, drive: Array, where: Array) -> Array | float:
-        """The readings at places `where` (n,) in ticks, less those of smooth curves through the ticks, (n, channels).
-
-        Zero where readings are smooth enough; `drive` is that of `between_ticks`. A logger that is not in step reads
-        there.
-        """
-        return 0.0
-
     def noisy(self, system: System, rms: Mapping[str, float]) -> System:
         """The system with the noise of measured channels replaced."""
         return system.moved("sensors", **rms)

@@ -11,8 +11,6 @@ from laboratories.table import motor
 from models.registry import Array
 from models.system import System
 
-PLACES = 32  # between ticks, at which the force of a motor is computed exactly
-
 
 def motor_at_ticks(system: System, command: Array) -> tuple[Array, Array]:
     """What is asked of the motor (ticks,) N within its limit, and its states at the ticks (3, ticks)."""
@@ -47,49 +45,12 @@ def motor_bend(system: System, command: Array, place: float | None = None) -> Ar
     return result
 
 
-def motor_apart(system: System, command: Array, where: Array) -> Array:
-    """The motor's force at places `where` (n,) in ticks, less that of a smooth curve through the ticks, (n,) N.
-
-    `command` and the limit are those of `motor_bend`.
-    """
-    lag, damping = system.plan.damper.motor_time_constant, system.effects.damper.motor_damping
-    interval = system.plan.test.interval
-    wanted, states = motor_at_ticks(system, command)
-    tick = np.clip(np.floor(where).astype(np.int64), 0, command.size - 2)
-    place = np.clip(where - tick, 0.0, 1.0)
-    now, then = states[motor.FORCE, tick], states[motor.FORCE, tick + 1]
-    inside = wanted[tick]  # of a motor that follows at once
-    if lag > 0.0:
-        weights = motor.weights(interval, lag, damping, PLACES)
-        own = np.arange(PLACES + 1) / PLACES
-        inside = sum(
-            np.interp(place, own, weights[:, row]) * states[row, tick] for row in range(weights.shape[1])
-        )
-    bends = np.pad(np.diff(states[motor.FORCE], 2), 1)
-    curve = 0.5 * place * (1.0 - place) * ((1.0 - place) * bends[tick] + place * bends[tick + 1])
-    return np.asarray(np.where(place > 0.0, inside - (1.0 - place) * now - place * then + curve, 0.0))
-
-
 def corners(system: System, command: Array) -> tuple[float, float, Array]:
     """The table's frequency (rad/s), its dead time (ticks), and the second differences of its command (ticks,) m."""
     table = system.plan.table
     steps = np.zeros(command.size)
     steps[1:-1] = np.diff(system.effects.table.gain * command, 2)
     return 2.0 * math.pi * table.frequency, table.delay / system.plan.test.interval, steps
-
-
-def acceleration_apart(system: System, command: Array, where: Array) -> Array:
-    """The table's acceleration at places `where` (n,) in ticks, less that of lines between the ticks, (n,) m/s².
-
-    `command` is that of `acceleration_bend`, which has the formula.
-    """
-    if math.isinf(system.plan.table.frequency):
-        return np.zeros(where.size)
-    omega, ticks, steps = corners(system, command)
-    between = ticks % 1.0
-    inside = (where - between) % 1.0
-    height = 0.5 * inside * (1.0 - inside) - 0.5 * between * (1.0 - between)
-    return np.asarray(omega**2 * height * np.interp(where - 1.0 - ticks, np.arange(command.size), steps))
 
 
 def acceleration_bend(system: System, command: Array, place: float | None = None) -> Array:

@@ -93,16 +93,6 @@ class TableKind(Kind):
         result[:, felt] = between.acceleration_bend(system, drive[:, 0], places[felt])
         return result
 
-    def apart(self, system: System, drive: Array, where: Array) -> Array:
-        """Of the damper's force and the acceleration, as `between_ticks` has them."""
-        result = np.zeros((where.size, len(self.channels.names)))
-        force, felt = (
-            self.channels.names.index(name) for name in (self.channels.force, "table_acceleration")
-        )
-        result[:, force] = -between.motor_apart(system, drive[:, 1], where)
-        result[:, felt] = between.acceleration_apart(system, drive[:, 0], where)
-        return result
-
     def drifts(self, plan: Plan) -> bool:
         """Whether the damper has no spring."""
         return plan.damper.stiffness == 0.0

@@ -35,18 +35,6 @@ def within(length: float, time_constant: float, damping: float) -> Array:
     return result
 
 
-def weights(interval: float, time_constant: float, damping: float, places: int) -> Array:
-    """The force of a motor at places in an interval (s) from its force, rate and command at the tick, (places + 1, 3).
-
-    See `within` for the other arguments.
-    """
-    step, here = within(interval / places, time_constant, damping), np.eye(4)[FORCE]
-    rows = [here]
-    for _ in range(places):
-        rows.append(here := here @ step)
-    return np.array(rows)[:, :INTEGRAL]
-
-
 def states(command: Array, interval: float, time_constant: float, damping: float) -> Array:
     """Force (N), rate (N/s) and command (N) of a motor at each tick, (3, ticks), at rest at the first one.
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import signal
+from scipy.interpolate import CubicSpline
 
 from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, LoggerFilter
 from common.roles import MASTER
@@ -222,3 +223,25 @@ def test_what_lies_between_the_ticks_is_foreseen_behind_a_channel(name: str, who
     left, missed = ((np.std((one - shown)[100:-20], axis=0)) for one in (found, plain))
     places = [part.lab.kind.channels.names.index(name) for name in ("table_acceleration", "damper_force")]
     assert np.all(left[places] < 0.05 * missed[places])
+
+
+@pytest.mark.parametrize("lag", [0.0, 1e-3, 3e-3])
+@pytest.mark.parametrize("rate", [450.0, 600.0, 1024.0])
+def test_what_rows_between_the_ticks_make_of_a_reading_is_foreseen(
+    rate: float, lag: float, whole: Record
+) -> None:
+    """A cubic spline through rows of a logger's own was taken for the values at the ticks."""
+    part = lab_b(whole)
+    plan = replace(part.lab.plan, damper=replace(part.lab.plan.damper, motor_time_constant=lag))
+    channel = ImportedChannel(interpolated=True, rate=rate, first=0.7e-3)
+    part = part.replaced(lab=replace(part.lab, plan=plan), channels=(channel,) * len(part.channels))
+    fine = finely(part)
+    rows = channel.samples(len(part.measured), INTERVAL)
+    seen = np.stack([np.interp(rows * STEPS, np.arange(len(fine)), one) for one in fine.T], axis=1)
+    shown = CubicSpline(rows, seen)(np.arange(len(part.measured)))
+    left, missed = (
+        np.std((one - shown)[100:-100], axis=0) for one in (part.predict(System(plan)), fine[::STEPS])
+    )
+    places = [part.lab.kind.channels.names.index(name) for name in ("table_acceleration", "damper_force")]
+    # a motor without lag steps, and a row near a step may have either value
+    assert np.all(left[places] < [0.1, 0.1 if lag > 0.0 else 0.4] * missed[places])

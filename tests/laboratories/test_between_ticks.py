@@ -8,11 +8,10 @@ import math
 import numpy as np
 import pytest
 from scipy import signal
-from scipy.interpolate import CubicSpline
 
 from common.plan.plan import Plan
 from common.recording.imported import LoggerFilter, later
-from laboratories.table import between, motor
+from laboratories.table import between
 from models.registry import Array
 from models.system import System
 
@@ -129,40 +128,3 @@ def test_a_delay_sees_the_arcs_of_an_acceleration(late: float) -> None:
     bent = later(acceleration[::FINER] + between.acceleration_bend(system, command, -late % 1.0), late)
     missed, left = (float(np.std((seen - one)[100:-5])) for one in (at_ticks, bent))
     assert left < 0.2 * missed
-
-
-def error_of_interpolation(finely: Array, where: Array) -> Array:
-    """What a spline through samples at places `where`, in ticks, misses of a signal (ticks·FINER,) at its ticks."""
-    samples = np.interp(where, np.arange(finely.size) / FINER, finely)
-    return np.asarray(CubicSpline(where, samples)(np.arange(TICKS))) - finely[::FINER]
-
-
-@pytest.mark.parametrize(
-    ("lag", "damping"), [(0.0, math.inf), (1e-3, math.inf), (3e-3, math.inf), (3e-3, 0.6)]
-)
-@pytest.mark.parametrize("rate", [0.9, 1.2, 2.048])
-def test_what_a_logger_s_interpolation_misses_of_a_motor_s_force_is_foreseen(
-    lag: float, damping: float, rate: float
-) -> None:
-    plan = Plan()
-    system = System(
-        dataclasses.replace(plan, damper=dataclasses.replace(plan.damper, motor_time_constant=lag))
-    )
-    made = dataclasses.replace(system.effects.damper, motor_damping=damping)
-    system = dataclasses.replace(system, effects=dataclasses.replace(system.effects, damper=made))
-    interval = plan.test.interval
-    t = interval * np.arange(TICKS)
-    command = 20.0 * np.sin(2.0 * np.pi * 2.0 * t) + 5.0 * np.sin(2.0 * np.pi * 7.0 * t)
-    fine = np.repeat(command, FINER)[: TICKS * FINER]
-    if lag > 0.0:
-        states = motor.states(fine, interval / FINER, lag, damping)
-        fine = states[motor.FORCE]
-    else:
-        fine = np.concatenate([[0.0], fine[:-1]])
-    where = np.arange(0.3, TICKS - 1.0, 1.0 / rate)
-    missed = error_of_interpolation(fine, where)
-    apart = between.motor_apart(system, command, where)
-    foreseen = CubicSpline(where, apart)(np.arange(TICKS))
-    inside = slice(SETTLED, -SETTLED)
-    share = 0.25 if lag == 0.0 else 0.05  # a sample by chance on a tick may have either value
-    assert np.std((missed - foreseen)[inside]) < share * np.std(missed[inside])
