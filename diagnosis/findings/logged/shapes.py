@@ -107,6 +107,7 @@ def shaped(record: Record) -> Record:
     if record.stated is None or record.static or record.ticks < LEAST_TICKS:
         return record
     there = known(record)
+    record = sampled(record, there)
     if not any(group.free for group in groups(record)):
         record = anew(record, there)
     for group in groups(record):
@@ -115,7 +116,7 @@ def shaped(record: Record) -> Record:
 
 
 def sampled(record: Record, there: Mapping[Name, Mask]) -> Record:
-    """The record with filters and means, stated or found, that were given the readings at the ticks alone.
+    """The record with filters and means, stated or found, that were given the readings at the ticks alone, or not.
 
     So a controller filters its own readings. What machines do between ticks tells.
     """
@@ -127,9 +128,9 @@ def sampled(record: Record, there: Mapping[Name, Mask]) -> Record:
     }
     if not behind & there.keys():
         return record
-    now, other = (judged(one, there) for one in (record, replace(record, at_ticks=frozenset(behind))))
-    counted = now.told(behind & there.keys())
-    return other.record if other.far_likelier(now, counted) else record
+    other = replace(record, at_ticks=frozenset() if record.at_ticks else frozenset(behind))
+    now, tried = judged(record, there), judged(other, there)
+    return other if tried.far_likelier(now, now.told(behind & there.keys())) else record
 
 
 def anew(record: Record, there: Mapping[Name, Mask]) -> Record:
@@ -324,7 +325,9 @@ def spectra_of(lab: LaboratoryPart, fit: Fit, record: Record, counted: Iterable[
     if not own or stretch.stop - stretch.start < LEAST_TICKS:
         return None
     before = lab.replaced(
-        channels=tuple(replace(one, filter=None, average=0.0, delay=0.0, smooth=True) for one in lab.channels)
+        channels=tuple(
+            replace(NOTHING_STATED, at_ticks=one.at_ticks, smooth=not one.at_ticks) for one in lab.channels
+        )
     )
     interval, system = record.plan.test.interval, record.systems[lab.role]
     movable = [one for one in lab.nuisances if not isinstance(one, LoggedReadings)]
