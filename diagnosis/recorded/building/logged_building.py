@@ -31,6 +31,7 @@ STEADY = 0.3  # of the noise of a force, by which its zero may be off and drift 
 BEFORE = 0.75  # share of what stated filters change, from which on they lie before the master
 SURE = 3.0  # standard deviations from which on a stated filter is taken to lie before the master
 OF_DIFFERENCES = 70.0  # Σ of the squared weights of fourth differences
+HALF = 0.5  # of the highest frequency of ticks, up to which noise is as loud as below it
 SLOPES = 2  # ticks to either side that the slopes and bends of a displacement take in
 
 
@@ -207,11 +208,13 @@ class LoggedBuilding(Building):
     def passes(self) -> Array:
         """Frequencies (storeys,) up to which noise passed, Hz: that of forces, all filters where these are alike.
 
-        A motion whose numbers were logged more slowly than at every tick has none beyond half their rate.
+        A motion whose numbers were logged more slowly than at every tick has none beyond half their rate. The highest
+        frequencies of ticks hold less than others where a converter or a spline through rows took some of it.
         """
         motion = self.channels[: self.motion.shape[1]]
         several = self.channels if self.behind else (self._stated, *motion)
-        return np.full(len(self.signals), min(one.passes for one in several))
+        lowest = min(one.passes for one in several)
+        return np.full(len(self.signals), min(lowest, HALF / (2.0 * self._interval)))
 
     @property
     def row(self) -> int:
