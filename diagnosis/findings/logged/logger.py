@@ -149,15 +149,17 @@ def bent(found: Diagnosis) -> list[str]:
 
 def passed(found: Diagnosis) -> list[str]:
     """A sentence for each kind of filter of the logger that the import map does not state."""
-    alike: dict[tuple[str, int], dict[str, LoggerFilter]] = {}
+    alike: dict[tuple[str, int, float], dict[str, LoggerFilter]] = {}
     for (_, name), one in found.record.passed.items():
         if one.filter is not None:
-            alike.setdefault((one.filter.type, one.filter.order), {})[name] = one.filter
+            kind = (one.filter.type, one.filter.order, one.filter.ripple)
+            alike.setdefault(kind, {})[name] = one.filter
     return [
         f"{' and '.join(those)} passed a low-pass filter of the data logger that the import map does not state: "
-        f"about {kind.title()}, of order {order} and {span([one.cutoff for one in those.values()])} Hz, late by "
+        f"about {kind.title()}, of order {order}{f', with a ripple of {ripple:g} dB,' if ripple else ''} and "
+        f"{span([one.cutoff for one in those.values()])} Hz, late by "
         f"{span([1e3 * ImportedChannel(one).late for one in those.values()])} ms. It was taken into account; state it."
-        for (kind, order), those in alike.items()
+        for (kind, order, ripple), those in alike.items()
     ]
 
 

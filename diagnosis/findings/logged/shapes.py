@@ -147,14 +147,16 @@ def anew(record: Record, there: Mapping[Name, Mask]) -> Record:
         return record
     spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
     group = Group(frozenset(names), replace(NOTHING_STATED, delay=low_pass.roughly(*spectra).late), free=True)
-    ended = judged(group.tried(record, smooth(0.0)), there)
-    tried = {one: judged(group.tried(record, one), there) for one in likeliest(spectra, group)}
-    channel = min(tried, key=lambda one: tried[one].surprise(counted))
-    found, late = tried[channel], judged(group.tried(record, bare(NOTHING_STATED, channel.late)), there)
-    others = [now, late, ended, judged(record, there, LOOSE)]
-    shown = sum(now.of[name] > found.of[name] + BEYOND for name in counted)
-    if shown >= SHOWN and all(found.far_likelier(one, counted) for one in others):
-        return found.record
+    ended, said = judged(group.tried(record, smooth(0.0)), there), partial(low_pass.surprises, spectra)
+    first, *others = likeliest(spectra, group)
+    if said(first) < said(NOTHING_STATED) - BEYOND:
+        tried = {one: judged(group.tried(record, one), there) for one in (first, *others)}
+        channel = min(tried, key=lambda one: tried[one].surprise(counted))
+        found, late = tried[channel], judged(group.tried(record, bare(NOTHING_STATED, channel.late)), there)
+        shown = sum(now.of[name] > found.of[name] + BEYOND for name in counted)
+        rivals = (now, late, ended, judged(record, there, LOOSE))
+        if shown >= SHOWN and all(found.far_likelier(one, counted) for one in rivals):
+            return found.record
     return ended.record if ended.far_likelier(now, counted) else record
 
 
