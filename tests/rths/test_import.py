@@ -22,7 +22,8 @@ from tests.rths.imports import COMMAND, DRIVE, FORCE, LATE, PLAN, TIMES, known, 
 def test_units_give_the_scales_and_the_loggers_properties_are_kept(bring: Any) -> None:
     rows = DRIVE + (
         'column_force = { column = "f", unit = "kN", delay = "2 ms", resolution = "0.1 kN", calibration = 0.01, '
-        'high_pass = 0.5, average = "10 ms", filter = { type = "butterworth", order = 4, cutoff = 100.0 } }\n'
+        'high_pass = 0.5, average = "10 ms", means = 3, '
+        'filter = { type = "butterworth", order = 4, cutoff = 100.0 } }\n'
     )
     code, run = bring(table("t,u,y,f", TIMES, COMMAND, LATE, FORCE), rows)
     assert code == 0
@@ -31,7 +32,7 @@ def test_units_give_the_scales_and_the_loggers_properties_are_kept(bring: Any) -
     stated = known(run).channel("master", "column_force")
     assert (stated.delay, stated.resolution, stated.calibration) == (0.002, 100.0, 0.01)
     assert stated.filter == LoggerFilter("butterworth", 4, 100.0)
-    assert (stated.high_pass, stated.average) == (0.5, 0.01)
+    assert (stated.high_pass, stated.average, stated.means) == (0.5, 0.01, 3)
     assert stated.rate == pytest.approx(100.0)
     assert not stated.interpolated
 
@@ -172,6 +173,11 @@ WRONG = {
         'x = { column = "u", unit = "kN" }',
         "",
         "'actuator_command' in [signals] is in kN",
+    ),
+    "means without a time": (
+        'x = { column = "u", means = 3 }',
+        "",
+        "means of 'actuator_command' in [signals] needs `average`, the time of one such mean",
     ),
     "unit and scale": ('x = { column = "u", unit = "mm", scale = 1.0 }', "", "both a unit and a scale"),
     "unknown filter": (

@@ -15,7 +15,7 @@ from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.logger.through import through_logger
 from loop import replay
 from models.registry import Array
-from models.system import SensorEffects, System
+from models.system import System
 
 FINER = 8  # steps of an interval
 AS_LATE = 1e-4  # s, steps of a delay between which a correction goes straight
@@ -42,20 +42,32 @@ class Finer:
         self._interval = lab.plan.test.interval
         self._kept: dict[tuple[int, int], Array] = {}
 
-    def missed(self, system: System) -> Array:
-        """What a model at the ticks misses of the readings (ticks, channels) that a logger recorded of a system."""
+    def missed(self, system: System) -> Array | float:
+        """What a model at the ticks misses of the readings (ticks, channels) that a logger recorded of a system.
+
+        It is zero where the logger read at the ticks.
+        """
+        late = {place: self.late(place, system) for place in range(len(self._channels))}
+        known = {place: seconds for place, seconds in late.items() if self.apart(place, seconds)}
+        if not known:
+            return 0.0
         result = np.zeros((len(self._drive), len(self._channels)))
-        for place, (name, channel) in enumerate(
-            zip(self._lab.kind.channels.names, self._channels, strict=True)
-        ):
-            made = system.effects.sensors.get(name, SensorEffects())
-            late = channel.delay + made.logger_delay
-            if not channel.at_ticks and (channel.blunt or channel.between or late != 0.0):
-                step, share = divmod(late / AS_LATE, 1.0)
-                result[:, place] = self.at(place, int(step))
-                if share > 0.0:
-                    result[:, place] += share * (self.at(place, int(step) + 1) - result[:, place])
+        for place, seconds in known.items():
+            step, share = divmod(seconds / AS_LATE, 1.0)
+            result[:, place] = self.at(place, int(step))
+            if share > 0.0:
+                result[:, place] += share * (self.at(place, int(step) + 1) - result[:, place])
         return result
+
+    def late(self, place: int, system: System) -> float:
+        """By how much a channel is late, s."""
+        made = system.effects.sensors.get(self._lab.kind.channels.names[place])
+        return self._channels[place].delay + (made.logger_delay if made else 0.0)
+
+    def apart(self, place: int, late: float) -> bool:
+        """Whether a channel that is `late` (s) shows what lies between the ticks."""
+        channel = self._channels[place]
+        return not channel.at_ticks and (channel.blunt or channel.between or late != 0.0)
 
     def at(self, place: int, step: int) -> Array:
         """The same of one channel (ticks,) that is late by so many steps of `AS_LATE`."""
