@@ -25,6 +25,7 @@ DATA_GAIN = 25.0  # 5 standard deviations squared
 # out effects that fit the noise.
 NEARLY_ALL, TRACE = 0.85, 2e-4
 HALF, SHARE = 0.5, 0.03
+FREED = 0.3  # of what is left, where no nominal parameter stays at the bound of its range: noise may be most of it
 # The same far from any noise, where more than LOUD times it is left: a model may well be refined in small steps there.
 LOUD, STEP_OF_REST, STEP_OF_WHOLE = 10.0, 0.4, 0.01
 
@@ -70,7 +71,10 @@ def is_worth(bare: Fit, before: Fit, after: Fit) -> bool:
     if prior > PRIOR_GAIN and data > -1.0 and remaining(before) < MATERIAL:
         return True
     # an effect that brings nominal parameters back as well needs to explain less: two signs of one cause
-    freeing = prior > PRIOR_GAIN and excess(before) - excess(after) > HALF * excess(before)
+    freed = bool(np.any(at_bound(before))) and not np.any(at_bound(after))
+    freeing = prior > PRIOR_GAIN and excess(before) - excess(after) > (FREED if freed else HALF) * excess(
+        before
+    )
     return not cancelling(bare, after, sizes) and (freeing or refines(bare, before, after))
 
 
