@@ -7,31 +7,36 @@ not. So each shape is weighed by all of that, with the nominal models at their b
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from common.recording.imported import NOTHING_STATED, RIPPLING, ImportedChannel, LoggerFilter
-from diagnosis.findings.logged.filters import ANY_GAIN, AS_LIKELY, SPOILT
-from diagnosis.findings.sensors import readings
-from diagnosis.fits import fitting, hypothesis, residuals
+from diagnosis.findings.logged.filters import ANY_GAIN
+from diagnosis.findings.logged.judged import (
+    BANDS,
+    Name,
+    force,
+    highest,
+    judged,
+    known,
+    laboratories,
+    named,
+)
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.threads import each
-from diagnosis.recorded.divided import parts_of
+from diagnosis.recorded.building.logged_building import BALANCE
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.nuisances import ALIKE, LoggedReadings, channels
-from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.recorded.parts import LaboratoryPart, Part
 from diagnosis.recorded.record import LEAST_TICKS, Delay, Record
 from diagnosis.signals import low_pass
 from diagnosis.signals.low_pass import ReadSpectra, Shape
 from diagnosis.signals.mask import Mask, longest
 from diagnosis.signals.strength import BEYOND
-from models.registry import Array
 
 # Filters usual before converters: analogue ones, of switched capacitors with a ripple, and means of means in a
 # converter of sigma-delta type.
@@ -44,16 +49,10 @@ FILTERS = (
 SHAPES = (*map(low_pass.like, FILTERS), low_pass.means(1), low_pass.means(3))
 # Over the delay by which a filter was found, of another one: the nominal models may be late or early themselves.
 LEAST, MOST = 0.5, 1.8
-NYQUIST, ROWS = 0.49, 0.45  # of the rate of the ticks, and of rows that were interpolated, highest frequency
-BANDS = 24
-REACH = 25  # ticks beside missing rows, which count for no shape
 LOOSE = 10.0  # tolerances of the plan's parameters, in which a machine may be at fault
 SHOWN = 2  # readings that must show a filter where no delay is known
 FAMILIES = 4  # of shapes, of which the likeliest is judged by all that was read
 ROUNDS = 2  # of looking for a shape, each about nominal models at their best behind the one before it
-
-
-Name = tuple[str, str]  # topic and name of a reading
 
 
 class Group(NamedTuple):
@@ -76,32 +75,6 @@ class Group(NamedTuple):
         return replace(record, passed=passed, late=late)
 
 
-class Judged(NamedTuple):
-    """How well a record is told by the nominal models of its laboratories at their best."""
-
-    record: Record
-    fits: list[tuple[LaboratoryPart, Fit]]
-    of: dict[Name, float]  # −2·log of how probable each reading is, up to a constant
-    missed: dict[Name, float]  # share of each reading's rms that its model leaves
-
-    def surprise(self, counted: Iterable[Name]) -> float:
-        """−2·log of how probable those readings and the nominal parameters are, up to a constant."""
-        return sum(self.of[name] for name in counted) + sum(fit.prior for _, fit in self.fits)
-
-    def far_likelier(self, other: Judged, counted: Collection[Name]) -> bool:
-        """Whether the readings are far likelier than in another one, and none is much less likely.
-
-        A reading may lose a part of what all gain, as nominal parameters follow them all.
-        """
-        gain = other.surprise(counted) - self.surprise(counted)
-        lost = max(self.of[name] - other.of[name] for name in counted)
-        return gain > BEYOND and lost < max(BEYOND, AS_LIKELY * gain)
-
-    def told(self, names: Iterable[Name]) -> set[Name]:
-        """Those of the readings that their models tell, or all of them where they tell none."""
-        return {name for name in names if self.missed.get(name, 1.0) < SPOILT} or set(names)
-
-
 def shaped(record: Record) -> Record:
     """An imported record with the likeliest shape of what its readings passed, where the map does not state it."""
     if record.stated is None or record.static or record.ticks < LEAST_TICKS:
@@ -110,9 +83,15 @@ def shaped(record: Record) -> Record:
     record = sampled(record, there)
     if not any(group.free for group in groups(record)):
         record = anew(record, there)
+    found = sampled(united(all_reshaped(record, there), there), there)
+    return found if found.at_ticks == record.at_ticks else all_reshaped(found, there)
+
+
+def all_reshaped(record: Record, there: Mapping[Name, Mask]) -> Record:
+    """The record with every group of readings behind its likeliest shape."""
     for group in groups(record):
         record = reshaped(record, group, there)
-    return sampled(united(record, there), there)
+    return record
 
 
 def sampled(record: Record, there: Mapping[Name, Mask]) -> Record:
@@ -142,7 +121,7 @@ def anew(record: Record, there: Mapping[Name, Mask]) -> Record:
     """
     names = unstated(record) & there.keys()
     now = judged(record, there)
-    counted = now.told(names)
+    counted = now.told(names | balanced(there))
     if not counted:
         return record
     spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
@@ -169,10 +148,15 @@ def united(record: Record, there: Mapping[Name, Mask]) -> Record:
     if not found or found[0].names == names:
         return record
     now = judged(record, there)
-    counted = now.told(names)
+    counted = now.told(names | balanced(there))
     every = Group(frozenset(names), NOTHING_STATED, free=True)
     tried = [judged(every.tried(record, group.channel), there) for group in found]
     return min([now, *tried], key=lambda one: one.surprise(counted)).record
+
+
+def balanced(there: Collection[Name]) -> set[Name]:
+    """The balances of a building, of what is there: forces are behind filters in it."""
+    return {name for name in there if name[0] == BALANCE}
 
 
 def unstated(record: Record) -> set[Name]:
@@ -211,7 +195,7 @@ def reshaped(record: Record, group: Group, there: Mapping[Name, Mask]) -> Record
     away slow motion must be far likelier than machines far from their plan, which may do so too.
     """
     now = judged(record, there)
-    counted = now.told(group.names & there.keys())
+    counted = now.told(group.names & there.keys() | balanced(there))
     for _ in range(ROUNDS if counted else 0):
         spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
         late = group.channel.late
@@ -277,51 +261,13 @@ def smooth(late: float) -> ImportedChannel:
     return ImportedChannel(delay=late, smooth=True)
 
 
-def judged(record: Record, there: Mapping[Name, Mask], loose: float = 1.0) -> Judged:
-    """A record with the nominal models of its laboratories at their best, by what is `there` (ticks,) of each reading.
+def spectra_of(lab: Part, fit: Fit, record: Record, counted: Iterable[Name]) -> ReadSpectra | None:
+    """Spectra of those readings of a laboratory that count, about a fit of its nominal model and before any filter.
 
-    The same ticks count behind every shape. The plan's parameters have `loose` times their tolerances.
+    None of a building, whose balance filters do not change but for the forces.
     """
-    steps, interval = readings.resolutions(record, {}), record.plan.test.interval
-    result = Judged(record, [], {}, {})
-    for lab in (loosened(lab, loose).logged(record.late) for lab in laboratories(record)):
-        fit = fitting.fit(residuals.prepare(lab, record, steps), {})
-        result.fits.append((lab, fit))
-        columns = zip(named(lab), lab.measured.T, predicted(lab, fit).T, strict=True)
-        for name, *pair in (row for row in columns if row[0] in there):
-            read, said = ((values * there[name])[:, None] for values in pair)
-            looked = low_pass.spectra(read, said, np.zeros((*read.shape, 0)), interval, highest(lab), BANDS)
-            result.of[name] = low_pass.surprise_as_is(looked)
-            result.missed[name] = float(np.std(read - said) / np.std(read))
-    return result
-
-
-def loosened(lab: LaboratoryPart, times: float) -> LaboratoryPart:
-    """A laboratory whose parameters have so many times their tolerances."""
-    return lab.replaced(
-        nuisances=tuple(replace(one, tolerance=times * one.tolerance) for one in lab.nuisances)
-    )
-
-
-def known(record: Record) -> dict[Name, Mask]:
-    """Where each reading that was recorded and moves is present (ticks,), by topic and name."""
-    found = {}
-    for lab in laboratories(record):
-        for name, signal, read, there in zip(
-            named(lab), lab.signals, lab.measured.T, lab.present.T, strict=True
-        ):
-            if record.has(signal) and there.any() and np.ptp(read[there]) > 0.0:
-                found[name] = ndimage.binary_erosion(there, np.ones(2 * REACH + 1), border_value=1)
-    return found
-
-
-def predicted(lab: LaboratoryPart, fit: Fit) -> Array:
-    """Readings of a laboratory (ticks, signals) by a fit."""
-    return lab.predict(hypothesis.lay(fit.data, fit.z, fit.values))
-
-
-def spectra_of(lab: LaboratoryPart, fit: Fit, record: Record, counted: Iterable[Name]) -> ReadSpectra | None:
-    """Spectra of those readings of a laboratory that count, about a fit of its nominal model and before any filter."""
+    if not isinstance(lab, LaboratoryPart):
+        return None
     own = [place for place, name in enumerate(named(lab)) if name in counted and place != lab.freed]
     stretch = longest(np.all(lab.present[:, own], axis=1))
     if not own or stretch.stop - stretch.start < LEAST_TICKS:
@@ -346,34 +292,12 @@ def spectra_of(lab: LaboratoryPart, fit: Fit, record: Record, counted: Iterable[
         true[stretch],
         np.stack(slopes, axis=2)[stretch],
         interval,
-        highest(lab),
+        highest(lab, interval),
         BANDS,
     )
     return found._replace(rounds=1)
 
 
-def highest(lab: LaboratoryPart) -> float:
-    """The highest frequency (Hz) at which a laboratory's readings tell of a filter."""
-    rows = [one.rate for one in lab.channels if one.interpolated and one.rate > 0.0]
-    return min(NYQUIST / lab.interval, *(ROWS * rate for rate in rows), math.inf)
-
-
-def laboratories(record: Record) -> list[LaboratoryPart]:
-    """The laboratories of a record with enough ticks without missing rows."""
-    parts = [part for part in parts_of(record) if isinstance(part, LaboratoryPart)]
-    return [part for part in parts if part.present.any()]
-
-
 def signals_of(lab: RecordedLaboratory) -> list[tuple[Name, str]]:
     """Topic and name of a laboratory's readings, each with its signal in the record."""
     return [((lab.role, name), lab.signal(name)) for name in lab.kind.channels.names]
-
-
-def named(lab: LaboratoryPart) -> list[Name]:
-    """Topic and name of a laboratory's readings."""
-    return [(lab.role, name) for name in lab.lab.kind.channels.names]
-
-
-def force(record: Record, signal: str) -> bool:
-    """Whether a reading measures a force."""
-    return record.unit(signal) == "N"
