@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ from diagnosis.findings.logged.filters import AS_LIKELY, SPOILT
 from diagnosis.findings.sensors import readings
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
+from diagnosis.fits.residuals import Data
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import BALANCE, LoggedBuilding, logged
 from diagnosis.recorded.divided import parts_of
@@ -26,6 +27,7 @@ from models.registry import Array
 
 NYQUIST, ROWS = 0.49, 0.45  # of the rate of the ticks, and of rows that were interpolated, highest frequency
 BANDS = 24
+OF_BALANCE = 20.0  # Hz, up to which any filter passes noise of forces and of the motion alike
 REACH = 25  # ticks beside missing rows, which count for no shape
 
 Name = tuple[str, str]  # topic and name of a reading
@@ -57,26 +59,49 @@ class Judged(NamedTuple):
         return {name for name in names if self.missed.get(name, 1.0) < SPOILT} or set(names)
 
 
-def judged(record: Record, there: Mapping[Name, Mask], loose: float = 1.0) -> Judged:
-    """A record with the nominal models of its parts at their best, by what is `there` (ticks,) of each reading.
+def judged(
+    record: Record, there: Mapping[Name, Mask], loose: float = 1.0, near: Judged | None = None
+) -> Judged:
+    """A record with the nominal models of its laboratories at their best, by what is `there` of each reading (ticks,).
 
-    The same ticks count behind every shape. The plan's parameters of laboratories have `loose` times their tolerances.
+    The same ticks count behind every shape. The plan's parameters have `loose` times their tolerances. The best ones
+    are looked for from those of one that is `near`.
     """
-    steps = readings.resolutions(record, {})
     labs = [loosened(lab, loose).logged(record.late) for lab in laboratories(record)]
-    result = Judged(record, [], {}, {})
-    parts: list[Part] = [*labs, *balances(record)]
-    for part in parts:
-        fit = fitting.fit(residuals.prepare(part, record, steps), {})
+    return weighed(Judged(record, [], {}, {}), labs, there, near.fits[: len(labs)] if near else [])
+
+
+def balanced(found: Judged, there: Mapping[Name, Mask], near: Judged | None = None) -> Judged:
+    """The same with the balance of the building, in which the forces are that passed a filter."""
+    parts = balances(found.record)
+    return weighed(found, parts, there, near.fits[len(found.fits) :] if near else [])
+
+
+def weighed(
+    found: Judged, parts: Sequence[Part], there: Mapping[Name, Mask], near: Sequence[tuple[Part, Fit]]
+) -> Judged:
+    """The same with further parts at their best, from fits that are `near`."""
+    steps = readings.resolutions(found.record, {})
+    result = Judged(found.record, list(found.fits), dict(found.of), dict(found.missed))
+    for place, part in enumerate(parts):
+        data = residuals.prepare(part, found.record, steps)
+        fit = fitted(data, near[place][1] if place < len(near) else None)
         result.fits.append((part, fit))
         columns = zip(named(part), part.measured.T, predicted(part, fit).T, strict=True)
         for name, *pair in (row for row in columns if row[0] in there):
             read, said = ((values * there[name])[:, None] for values in pair)
-            none, interval = np.zeros((*read.shape, 0)), record.plan.test.interval
+            none, interval = np.zeros((*read.shape, 0)), found.record.plan.test.interval
             looked = low_pass.spectra(read, said, none, interval, highest(part, interval), BANDS)
             result.of[name] = low_pass.surprise_as_is(looked)
             result.missed[name] = float(np.std(read - said) / np.std(read))
     return result
+
+
+def fitted(data: Data, near: Fit | None) -> Fit:
+    """The nominal model of a part at its best, from one that is near, with the slopes that it had."""
+    if near is None or near.reduced.shape != (data.groups, data.sigma.size):
+        return fitting.fit(data, {})
+    return fitting.fit(data, {}, near.z, slopes=near.jacobian, rounds=2)
 
 
 def balances(record: Record) -> list[LoggedBuilding]:
@@ -112,8 +137,9 @@ def predicted(part: Part, fit: Fit) -> Array:
 
 def highest(part: Part, interval: float) -> float:
     """The highest frequency (Hz) at which a part's readings tell of a filter."""
-    channels = part.channels if isinstance(part, LaboratoryPart | Building) else ()
-    rows = [one.rate for one in channels if one.interpolated and one.rate > 0.0]
+    if not isinstance(part, LaboratoryPart):
+        return OF_BALANCE
+    rows = [one.rate for one in part.channels if one.interpolated and one.rate > 0.0]
     return min(NYQUIST / interval, *(ROWS * rate for rate in rows), math.inf)
 
 

@@ -19,6 +19,7 @@ from diagnosis.findings.logged.filters import ANY_GAIN
 from diagnosis.findings.logged.judged import (
     BANDS,
     Name,
+    balanced,
     force,
     highest,
     judged,
@@ -51,7 +52,10 @@ SHAPES = (*map(low_pass.like, FILTERS), low_pass.means(1), low_pass.means(3))
 LEAST, MOST = 0.5, 1.8
 LOOSE = 10.0  # tolerances of the plan's parameters, in which a machine may be at fault
 SHOWN = 2  # readings that must show a filter where no delay is known
-FAMILIES = 4  # of shapes, of which the likeliest is judged by all that was read
+FAMILIES, FINALISTS = (
+    4,
+    2,
+)  # of shapes, of which the likeliest are judged by laboratories, and by the building too
 ROUNDS = 2  # of looking for a shape, each about nominal models at their best behind the one before it
 
 
@@ -80,10 +84,9 @@ def shaped(record: Record) -> Record:
     if record.stated is None or record.static or record.ticks < LEAST_TICKS:
         return record
     there = known(record)
-    record = sampled(record, there)
     if not any(group.free for group in groups(record)):
         record = anew(record, there)
-    found = sampled(united(all_reshaped(record, there), there), there)
+    found = sampled(united(all_reshaped(united(record, there), there), there), there)
     return found if found.at_ticks == record.at_ticks else all_reshaped(found, there)
 
 
@@ -108,7 +111,8 @@ def sampled(record: Record, there: Mapping[Name, Mask]) -> Record:
     if not behind & there.keys():
         return record
     other = replace(record, at_ticks=frozenset() if record.at_ticks else frozenset(behind))
-    now, tried = judged(record, there), judged(other, there)
+    now = judged(record, there)
+    tried = judged(other, there, near=now)
     return other if tried.far_likelier(now, now.told(behind & there.keys())) else record
 
 
@@ -121,17 +125,23 @@ def anew(record: Record, there: Mapping[Name, Mask]) -> Record:
     """
     names = unstated(record) & there.keys()
     now = judged(record, there)
-    counted = now.told(names | balanced(there))
+    counted = now.told(names)
     if not counted:
         return record
     spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
     group = Group(frozenset(names), replace(NOTHING_STATED, delay=low_pass.roughly(*spectra).late), free=True)
-    ended, said = judged(group.tried(record, smooth(0.0)), there), partial(low_pass.surprises, spectra)
+    ended, said = (
+        judged(group.tried(record, smooth(0.0)), there, near=now),
+        partial(low_pass.surprises, spectra),
+    )
     first, *others = likeliest(spectra, group)
     if said(first) < said(NOTHING_STATED) - BEYOND:
-        tried = {one: judged(group.tried(record, one), there) for one in (first, *others)}
+        tried = {one: judged(group.tried(record, one), there, near=now) for one in (first, *others)}
         channel = min(tried, key=lambda one: tried[one].surprise(counted))
-        found, late = tried[channel], judged(group.tried(record, bare(NOTHING_STATED, channel.late)), there)
+        found, late = (
+            tried[channel],
+            judged(group.tried(record, bare(NOTHING_STATED, channel.late)), there, near=now),
+        )
         shown = sum(now.of[name] > found.of[name] + BEYOND for name in counted)
         rivals = (now, late, ended, judged(record, there, LOOSE))
         if shown >= SHOWN and all(found.far_likelier(one, counted) for one in rivals):
@@ -148,14 +158,14 @@ def united(record: Record, there: Mapping[Name, Mask]) -> Record:
     if not found or found[0].names == names:
         return record
     now = judged(record, there)
-    counted = now.told(names | balanced(there))
+    counted = now.told(names)
     every = Group(frozenset(names), NOTHING_STATED, free=True)
-    tried = [judged(every.tried(record, group.channel), there) for group in found]
+    tried = [judged(every.tried(record, group.channel), there, near=now) for group in found]
     return min([now, *tried], key=lambda one: one.surprise(counted)).record
 
 
-def balanced(there: Collection[Name]) -> set[Name]:
-    """The balances of a building, of what is there: forces are behind filters in it."""
+def of_balance(there: Collection[Name]) -> set[Name]:
+    """The balances of a building, of what is there."""
     return {name for name in there if name[0] == BALANCE}
 
 
@@ -192,19 +202,24 @@ def reshaped(record: Record, group: Group, there: Mapping[Name, Mask]) -> Record
     """The record with readings of a group behind the likeliest shape, if that is likelier than what is known.
 
     Where no more than a delay is known, it must be far likelier. Beside a delay that is stated, a filter that takes
-    away slow motion must be far likelier than machines far from their plan, which may do so too.
+    away slow motion must be far likelier than machines far from their plan, which may do so too. The balance of a
+    building, which takes longer, judges the likeliest ones only.
     """
-    now = judged(record, there)
-    counted = now.told(group.names & there.keys() | balanced(there))
+    now = balanced(judged(record, there), there)
+    own = now.told(group.names & there.keys())
+    counted = own | now.told(of_balance(there)) if own else own
     for _ in range(ROUNDS if counted else 0):
         spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
         late = group.channel.late
-        shapes = dict.fromkeys([*likeliest(spectra, group), smooth(late), bare(NOTHING_STATED, late)])
-        tried = {one: judged(group.tried(record, one), there) for one in shapes}
+        known_as, sharp = bare(NOTHING_STATED, late), smooth(late)
+        every = dict.fromkeys([*likeliest(spectra, group), sharp, known_as])
+        by_labs = {one: judged(group.tried(record, one), there, near=now) for one in every}
+        first = sorted(by_labs, key=lambda one: by_labs[one].surprise(own))[:FINALISTS]
+        tried = {one: balanced(by_labs[one], there, now) for one in dict.fromkeys([*first, sharp, known_as])}
         channel = min(tried, key=lambda one: tried[one].surprise(counted))
         if not group.free and channel.late > channel.delay:
-            loose = judged(group.tried(record, smooth(late)), there, LOOSE)
-            channel = channel if tried[channel].far_likelier(loose, counted) else smooth(late)
+            loose = balanced(judged(group.tried(record, sharp), there, LOOSE), there)
+            channel = channel if tried[channel].far_likelier(loose, counted) else sharp
         found = tried[channel]
         sure = found.far_likelier(now, counted)
         if not (sure or (group.channel.blunt and found.surprise(counted) < now.surprise(counted))):
