@@ -99,7 +99,8 @@ def weighed(
 
 def fitted(data: Data, near: Fit | None) -> Fit:
     """The nominal model of a part at its best, from one that is near, with the slopes that it had."""
-    if near is None or near.reduced.shape != (data.groups, data.sigma.size):
+    alike = near is not None and near.reduced.shape == (data.groups, data.sigma.size)
+    if near is None or not alike or near.z.size != len(data.part.nuisances):
         return fitting.fit(data, {})
     return fitting.fit(data, {}, near.z, slopes=near.jacobian, rounds=2)
 
