@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from scipy import signal
 from scipy.interpolate import CubicSpline
 
-from common.recording.imported import IMPORT, ImportedChannel, ImportedData
+from common.recording.imported import IMPORT, ImportedChannel, ImportedData, LoggerFilter
 from common.roles import MASTER
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.unexplained import leaves
@@ -17,9 +19,10 @@ from diagnosis.recorded.building import motion as recorded_motion
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import LoggedBuilding
 from diagnosis.recorded.record import Record
+from diagnosis.signals.noise.level import white_rms
 from models.registry import Array
 from models.system import System
-from tests.diagnosis.cases import Cases
+from tests.diagnosis.cases import Cases, lab_a, white
 
 
 @pytest.mark.parametrize(("before", "late"), [(True, 8), (True, 1), (False, 8), (False, 1)], ids=str)
@@ -233,3 +236,45 @@ def test_the_motion_that_noise_is_held_against_has_none_of_it(cases: Cases) -> N
     wave = part.smooth[500:-500, 0]
     passed = np.exp(-0.5 * (0.25 * np.pi) ** 2)
     assert wave == pytest.approx(passed * slow[500:-500], abs=0.07)
+
+
+@pytest.mark.parametrize("hole", [False, True])
+def test_noise_of_the_motion_is_measured_behind_a_filter_and_beside_a_hole(hole: bool, cases: Cases) -> None:
+    """The log has as much noise as the master read, of its own, behind a filter that the master did not have."""
+    whole = cases.record(seed=0, duration=20.0)
+    true = lab_a(whole).predict(System(whole.plan))[:, 1]
+    rms = float(np.std(whole.signals["column_force"] - true))
+    low_pass = LoggerFilter("elliptic", 6, 140.0, 0.1, 60.0)
+    force = low_pass.filtered(true, whole.plan.test.interval) + rms * white(5, true.size)
+    used = low_pass.filtered(whole.signals["damper_force_used"], whole.plan.test.interval)
+    there = {name: mask.copy() for name, mask in whole.present.items()}
+    for mask in there.values():
+        mask[3000:3040] = not hole
+    stated = {"filter": asdict(low_pass)}
+    channels = {MASTER: {"column_force": stated, "damper_force_used": stated}}
+    metadata = whole.run.metadata | {IMPORT: {"data": "a.csv", "channels": json.dumps(channels)}}
+    found = logged_building.logged(
+        Building(
+            replace(
+                whole,
+                present=there,
+                signals=whole.signals | {"column_force": force, "damper_force_used": used},
+                run=replace(whole.run, metadata=metadata),
+            )
+        )
+    )
+    assert found.behind
+    assert found.of_motion == pytest.approx(0.5, abs=0.15)
+
+
+def test_the_noise_of_a_balance_is_not_measured_at_the_highest_frequencies(cases: Cases) -> None:
+    """They hold less, as behind a spline through rows or a converter's own filter."""
+    whole = cases.record(seed=0, duration=20.0)
+    true = lab_a(whole).predict(System(whole.plan))[:, 1]
+    less = signal.firwin(9, 190.0, fs=500.0)
+    level = 10.0 * whole.planned_noise["column_force"]
+    noise = level * np.convolve(white(6, true.size), less, "same")
+    record = replace(whole, signals=whole.signals | {"column_force": true + noise})
+    data = residuals.prepare(LoggedBuilding(Building(record)), record)
+    assert data.white[0] == pytest.approx(level, rel=0.08)
+    assert white_rms(noise[:, None])[0] < 0.8 * level
