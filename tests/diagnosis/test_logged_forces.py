@@ -271,7 +271,7 @@ def test_the_noise_of_a_balance_is_not_measured_at_the_highest_frequencies(cases
     """They hold less, as behind a spline through rows or a converter's own filter."""
     whole = cases.record(seed=0, duration=20.0)
     true = lab_a(whole).predict(System(whole.plan))[:, 1]
-    less = signal.firwin(9, 190.0, fs=500.0)
+    less = signal.firwin(41, 190.0, fs=500.0)
     level = 10.0 * whole.planned_noise["column_force"]
     noise = level * np.convolve(white(6, true.size), less, "same")
     record = replace(whole, signals=whole.signals | {"column_force": true + noise})
