@@ -16,16 +16,16 @@ import numpy as np
 
 from common.recording.imported import NOTHING_STATED, RIPPLING, ImportedChannel, LoggerFilter
 from diagnosis.findings.logged.filters import ANY_GAIN
-from diagnosis.findings.logged.judged import (
+from diagnosis.findings.logged.nominal_fits import (
     BANDS,
     Name,
     balanced,
     force,
     highest,
-    judged,
     known,
     laboratories,
     named,
+    nominal_fits,
 )
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.threads import each
@@ -52,10 +52,7 @@ SHAPES = (*map(low_pass.like, FILTERS), low_pass.means(1), low_pass.means(3))
 LEAST, MOST = 0.5, 1.8
 LOOSE = 10.0  # tolerances of the plan's parameters, in which a machine may be at fault
 SHOWN = 2  # readings that must show a filter where no delay is known
-FAMILIES, FINALISTS = (
-    4,
-    2,
-)  # of shapes, of which the likeliest are judged by laboratories, and by the building too
+FAMILIES, FINALISTS = 4, 2  # of shapes, whose likeliest laboratories judge, and then the building too
 ROUNDS = 2  # of looking for a shape, each about nominal models at their best behind the one before it
 
 
@@ -111,8 +108,8 @@ def sampled(record: Record, there: Mapping[Name, Mask]) -> Record:
     if not behind & there.keys():
         return record
     other = replace(record, at_ticks=frozenset() if record.at_ticks else frozenset(behind))
-    now = judged(record, there)
-    tried = judged(other, there, near=now)
+    now = nominal_fits(record, there)
+    tried = nominal_fits(other, there, near=now)
     return other if tried.far_likelier(now, now.told(behind & there.keys())) else record
 
 
@@ -124,26 +121,26 @@ def anew(record: Record, there: Mapping[Name, Mask]) -> Record:
     machine.
     """
     names = unstated(record) & there.keys()
-    now = judged(record, there)
+    now = nominal_fits(record, there)
     counted = now.told(names)
     if not counted:
         return record
     spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
     group = Group(frozenset(names), replace(NOTHING_STATED, delay=low_pass.roughly(*spectra).late), free=True)
     ended, said = (
-        judged(group.tried(record, smooth(0.0)), there, near=now),
+        nominal_fits(group.tried(record, smooth(0.0)), there, near=now),
         partial(low_pass.surprises, spectra),
     )
     first, *others = likeliest(spectra, group)
     if said(first) < said(NOTHING_STATED) - BEYOND:
-        tried = {one: judged(group.tried(record, one), there, near=now) for one in (first, *others)}
+        tried = {one: nominal_fits(group.tried(record, one), there, near=now) for one in (first, *others)}
         channel = min(tried, key=lambda one: tried[one].surprise(counted))
         found, late = (
             tried[channel],
-            judged(group.tried(record, bare(NOTHING_STATED, channel.late)), there, near=now),
+            nominal_fits(group.tried(record, bare(NOTHING_STATED, channel.late)), there, near=now),
         )
         shown = sum(now.of[name] > found.of[name] + BEYOND for name in counted)
-        rivals = (now, late, ended, judged(record, there, LOOSE))
+        rivals = (now, late, ended, nominal_fits(record, there, LOOSE))
         if shown >= SHOWN and all(found.far_likelier(one, counted) for one in rivals):
             return found.record
     return ended.record if ended.far_likelier(now, counted) else record
@@ -157,10 +154,10 @@ def united(record: Record, there: Mapping[Name, Mask]) -> Record:
     names, found = unstated(record) & there.keys(), [group for group in groups(record) if group.free]
     if not found or found[0].names == names:
         return record
-    now = judged(record, there)
+    now = nominal_fits(record, there)
     counted = now.told(names)
     every = Group(frozenset(names), NOTHING_STATED, free=True)
-    tried = [judged(every.tried(record, group.channel), there, near=now) for group in found]
+    tried = [nominal_fits(every.tried(record, group.channel), there, near=now) for group in found]
     return min([now, *tried], key=lambda one: one.surprise(counted)).record
 
 
@@ -205,7 +202,7 @@ def reshaped(record: Record, group: Group, there: Mapping[Name, Mask]) -> Record
     away slow motion must be far likelier than machines far from their plan, which may do so too. The balance of a
     building, which takes longer, judges the likeliest ones only.
     """
-    now = balanced(judged(record, there), there)
+    now = balanced(nominal_fits(record, there), there)
     own = now.told(group.names & there.keys())
     counted = own | now.told(of_balance(there)) if own else own
     for _ in range(ROUNDS if counted else 0):
@@ -213,12 +210,12 @@ def reshaped(record: Record, group: Group, there: Mapping[Name, Mask]) -> Record
         late = group.channel.late
         known_as, sharp = bare(NOTHING_STATED, late), smooth(late)
         every = dict.fromkeys([*likeliest(spectra, group), sharp, known_as])
-        by_labs = {one: judged(group.tried(record, one), there, near=now) for one in every}
+        by_labs = {one: nominal_fits(group.tried(record, one), there, near=now) for one in every}
         first = sorted(by_labs, key=lambda one: by_labs[one].surprise(own))[:FINALISTS]
         tried = {one: balanced(by_labs[one], there, now) for one in dict.fromkeys([*first, sharp, known_as])}
         channel = min(tried, key=lambda one: tried[one].surprise(counted))
         if not group.free and channel.late > channel.delay:
-            loose = balanced(judged(group.tried(record, sharp), there, LOOSE), there)
+            loose = balanced(nominal_fits(group.tried(record, sharp), there, LOOSE), there)
             channel = channel if tried[channel].far_likelier(loose, counted) else sharp
         found = tried[channel]
         sure = found.far_likelier(now, counted)

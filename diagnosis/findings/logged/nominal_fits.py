@@ -33,7 +33,7 @@ REACH = 25  # ticks beside missing rows, which count for no shape
 Name = tuple[str, str]  # topic and name of a reading
 
 
-class Judged(NamedTuple):
+class NominalFits(NamedTuple):
     """How well a record is told by the nominal models of its laboratories at their best."""
 
     record: Record
@@ -45,7 +45,7 @@ class Judged(NamedTuple):
         """−2·log of how probable those readings and the nominal parameters are, up to a constant."""
         return sum(self.of[name] for name in counted) + sum(fit.prior for _, fit in self.fits)
 
-    def far_likelier(self, other: Judged, counted: Collection[Name]) -> bool:
+    def far_likelier(self, other: NominalFits, counted: Collection[Name]) -> bool:
         """Whether the readings are far likelier than in another one, and none is much less likely.
 
         A reading may lose a part of what all gain, as nominal parameters follow them all.
@@ -59,30 +59,30 @@ class Judged(NamedTuple):
         return {name for name in names if self.missed.get(name, 1.0) < SPOILT} or set(names)
 
 
-def judged(
-    record: Record, there: Mapping[Name, Mask], loose: float = 1.0, near: Judged | None = None
-) -> Judged:
+def nominal_fits(
+    record: Record, there: Mapping[Name, Mask], loose: float = 1.0, near: NominalFits | None = None
+) -> NominalFits:
     """A record with the nominal models of its laboratories at their best, by what is `there` of each reading (ticks,).
 
     The same ticks count behind every shape. The plan's parameters have `loose` times their tolerances. The best ones
     are looked for from those of one that is `near`.
     """
     labs = [loosened(lab, loose).logged(record.late) for lab in laboratories(record)]
-    return weighed(Judged(record, [], {}, {}), labs, there, near.fits[: len(labs)] if near else [])
+    return weighed(NominalFits(record, [], {}, {}), labs, there, near.fits[: len(labs)] if near else [])
 
 
-def balanced(found: Judged, there: Mapping[Name, Mask], near: Judged | None = None) -> Judged:
+def balanced(found: NominalFits, there: Mapping[Name, Mask], near: NominalFits | None = None) -> NominalFits:
     """The same with the balance of the building, in which the forces are that passed a filter."""
     parts = balances(found.record)
     return weighed(found, parts, there, near.fits[len(found.fits) :] if near else [])
 
 
 def weighed(
-    found: Judged, parts: Sequence[Part], there: Mapping[Name, Mask], near: Sequence[tuple[Part, Fit]]
-) -> Judged:
+    found: NominalFits, parts: Sequence[Part], there: Mapping[Name, Mask], near: Sequence[tuple[Part, Fit]]
+) -> NominalFits:
     """The same with further parts at their best, from fits that are `near`."""
     steps = readings.resolutions(found.record, {})
-    result = Judged(found.record, list(found.fits), dict(found.of), dict(found.missed))
+    result = NominalFits(found.record, list(found.fits), dict(found.of), dict(found.missed))
     for place, part in enumerate(parts):
         data = residuals.prepare(part, found.record, steps)
         fit = fitted(data, near[place][1] if place < len(near) else None)
