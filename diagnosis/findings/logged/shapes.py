@@ -127,18 +127,14 @@ def anew(record: Record, there: Mapping[Name, Mask]) -> Record:
         return record
     spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
     group = Group(frozenset(names), replace(NOTHING_STATED, delay=low_pass.roughly(*spectra).late), free=True)
-    ended, said = (
-        nominal_fits(group.tried(record, smooth(0.0)), there, near=now),
-        partial(low_pass.surprises, spectra),
-    )
+    ended = nominal_fits(group.tried(record, smooth(0.0)), there, near=now)
+    said = partial(low_pass.surprises, spectra)
     first, *others = likeliest(spectra, group)
     if said(first) < said(NOTHING_STATED) - BEYOND:
         tried = {one: nominal_fits(group.tried(record, one), there, near=now) for one in (first, *others)}
         channel = min(tried, key=lambda one: tried[one].surprise(counted))
-        found, late = (
-            tried[channel],
-            nominal_fits(group.tried(record, bare(NOTHING_STATED, channel.late)), there, near=now),
-        )
+        found, delay = tried[channel], bare(NOTHING_STATED, channel.late)
+        late = nominal_fits(group.tried(record, delay), there, near=now)
         shown = sum(now.of[name] > found.of[name] + BEYOND for name in counted)
         rivals = (now, late, ended, nominal_fits(record, there, LOOSE))
         if shown >= SHOWN and all(found.far_likelier(one, counted) for one in rivals):
