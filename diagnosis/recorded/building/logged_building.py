@@ -152,7 +152,7 @@ class LoggedBuilding(Building):
             usual = math.sqrt(white_noise(sums[0]) / sums.shape[2])
             rest = rest - within_tolerances(rest, np.stack(others, axis=1) - rest[:, None], usual)
         level = float(np.mean(np.square(rest))) * left.shape[2]
-        fastest = max(1, math.ceil(0.5 / (self._interval * float(np.min(self.passes)))))
+        fastest = max(1, math.ceil(0.5 / (self._interval * self.passed)))
         rest, motion = (
             np.diff(summed(x[stretch], fastest), n=4, axis=0)[::5] for x in (self.left(), self.measured)
         )
@@ -206,15 +206,20 @@ class LoggedBuilding(Building):
 
     @property
     def passes(self) -> Array:
-        """Frequencies (storeys,) up to which noise passed, Hz: that of forces, all filters where these are alike.
+        """Frequencies (storeys,) up to which noise is as loud as at low ones, Hz.
 
-        A motion whose numbers were logged more slowly than at every tick has none beyond half their rate. The highest
-        frequencies of ticks hold less than others where a converter or a spline through rows took some of it.
+        The highest frequencies of ticks hold less where a converter or a spline through rows took some of it.
+        """
+        return np.full(len(self.signals), min(self.passed, HALF / (2.0 * self._interval)))
+
+    @property
+    def passed(self) -> float:
+        """Frequency up to which filters passed noise, Hz: those of forces, all of them where these are alike.
+
+        A motion whose numbers were logged more slowly than at every tick has none beyond half their rate.
         """
         motion = self.channels[: self.motion.shape[1]]
-        several = self.channels if self.behind else (self._stated, *motion)
-        lowest = min(one.passes for one in several)
-        return np.full(len(self.signals), min(lowest, HALF / (2.0 * self._interval)))
+        return min(one.passes for one in (self.channels if self.behind else (self._stated, *motion)))
 
     @property
     def row(self) -> int:
