@@ -205,8 +205,9 @@ def program(folder: Path, name: str, text: str) -> None:
 
 DEAF = "import signal, time\nsignal.signal(signal.SIGINT, lambda *_: None)\ntime.sleep(60)\n"
 # An interrupt that comes right before a sleep begins is seen at its end, so that it sleeps briefly, again and again.
-OBEDIENT = (
-    "import sys, time\ntry:\n    print('here', flush=True)\n    for _ in range(600):\n        time.sleep(0.1)\n"
+OBEDIENT = (  # also where the tests run in the background of a shell, which lets them ignore interrupts
+    "import signal, sys, time\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    "try:\n    print('here', flush=True)\n    for _ in range(600):\n        time.sleep(0.1)\n"
     "except KeyboardInterrupt:\n    sys.exit(3)\n"
 )
 
