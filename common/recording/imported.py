@@ -116,9 +116,19 @@ class ImportedChannel:
     followed: bool = False  # whether it is the plan's own motion between the ticks that its rows showed
     means: int = 1  # how many such means follow one another: three in a converter with a sinc³ filter
     smooth: bool = False  # whether a filter without any other trace took away what is faster than the ticks
-    at_ticks: bool = (
-        False  # whether its filter or mean was given the readings at the ticks alone, as a digital one
-    )
+    at_ticks: bool = False  # whether its filter was given the readings at the ticks alone, as a digital one
+
+    @property
+    def chain(self) -> ImportedChannel:
+        """What its signal passed, its filters, means and delay, and nothing else that is stated."""
+        return ImportedChannel(
+            self.filter,
+            self.delay,
+            high_pass=self.high_pass,
+            average=self.average,
+            means=self.means,
+            smooth=self.smooth,
+        )
 
     @property
     def blunt(self) -> bool:

@@ -72,9 +72,8 @@ def is_worth(bare: Fit, before: Fit, after: Fit) -> bool:
         return True
     # an effect that brings nominal parameters back as well needs to explain less: two signs of one cause
     freed = bool(np.any(at_bound(before))) and not np.any(at_bound(after))
-    freeing = prior > PRIOR_GAIN and excess(before) - excess(after) > (FREED if freed else HALF) * excess(
-        before
-    )
+    least = (FREED if freed else HALF) * excess(before)
+    freeing = prior > PRIOR_GAIN and excess(before) - excess(after) > least
     return not cancelling(bare, after, sizes) and (freeing or refines(bare, before, after))
 
 

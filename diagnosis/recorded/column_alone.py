@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -79,17 +78,6 @@ def apart(motion: ImportedChannel, force: ImportedChannel) -> tuple[ImportedChan
     The force that a filtered motion makes has passed the motion's filter. So the force that was measured passes that
     one as well, and the prediction that of the force, which a nonlinear law changes in details only.
     """
-
-    def chain(channel: ImportedChannel) -> ImportedChannel:
-        return replace(
-            NOTHING_STATED,
-            filter=channel.filter,
-            delay=channel.delay,
-            high_pass=channel.high_pass,
-            average=channel.average,
-            means=channel.means,
-        )
-
-    if chain(motion) == chain(force):
+    if motion.chain == force.chain:
         return NOTHING_STATED, NOTHING_STATED
-    return chain(motion), chain(force)
+    return motion.chain, force.chain

@@ -20,7 +20,7 @@ from diagnosis.recorded.record import LEAST_TICKS, Record
 from diagnosis.signals import low_pass
 from diagnosis.signals.strength import BEYOND
 
-Common = TypeVar("Common")
+Shared = TypeVar("Shared")
 
 # Over the stated delay: some state the time to the middle of the last sample, others that of all of them.
 SHORTEST, LONGEST = 1.4, 2.8
@@ -63,9 +63,9 @@ def remarks(found: Diagnosis) -> list[str]:
     ]
 
 
-def alike(channels: Mapping[tuple[str, str], Common]) -> dict[Common, list[str]]:
+def alike(channels: Mapping[tuple[str, str], Shared]) -> dict[Shared, list[str]]:
     """The names of channels by what they have in common, from what each has by topic and name."""
-    names: dict[Common, list[str]] = {}
+    names: dict[Shared, list[str]] = {}
     for (_, name), value in channels.items():
         names.setdefault(value, []).append(name)
     return names

@@ -145,13 +145,13 @@ def highest(part: Part, interval: float) -> float:
 
 
 def laboratories(record: Record) -> list[LaboratoryPart]:
-    """The laboratories of a record with enough ticks without missing rows."""
+    """The laboratories of a record of which any reading counts."""
     parts = [part for part in parts_of(record) if isinstance(part, LaboratoryPart)]
     return [part for part in parts if part.present.any()]
 
 
 def named(part: Part) -> list[Name]:
-    """Topic and name of a part's readings; those of a building's storeys are one."""
+    """Topic and name of a part's readings; of a building the balance and the number of each storey."""
     if isinstance(part, LaboratoryPart):
         return [(part.role, name) for name in part.lab.kind.channels.names]
     return [(BALANCE, str(storey)) for storey in range(len(part.signals))]

@@ -126,14 +126,14 @@ def anew(record: Record, there: Mapping[Name, Mask]) -> Record:
     if not counted:
         return record
     spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
-    group = Group(frozenset(names), replace(NOTHING_STATED, delay=low_pass.roughly(*spectra).late), free=True)
+    group = Group(frozenset(names), ImportedChannel(delay=low_pass.roughly(*spectra).late), free=True)
     ended = nominal_fits(group.tried(record, smooth(0.0)), there, near=now)
     said = partial(low_pass.surprises, spectra)
     first, *others = likeliest(spectra, group)
     if said(first) < said(NOTHING_STATED) - BEYOND:
         tried = {one: nominal_fits(group.tried(record, one), there, near=now) for one in (first, *others)}
         channel = min(tried, key=lambda one: tried[one].surprise(counted))
-        found, delay = tried[channel], bare(NOTHING_STATED, channel.late)
+        found, delay = tried[channel], ImportedChannel(delay=channel.late)
         late = nominal_fits(group.tried(record, delay), there, near=now)
         shown = sum(now.of[name] > found.of[name] + BEYOND for name in counted)
         rivals = (now, late, ended, nominal_fits(record, there, LOOSE))
@@ -181,7 +181,7 @@ def groups(record: Record) -> list[Group]:
             if said.filter or said.average or not record.has(signal):
                 continue
             late = record.late.force if force(record, signal) else record.late.motion
-            channel = bare(now, late.about if lab.free else now.delay)
+            channel = replace(now.chain, delay=late.about if lab.free else now.delay)
             if channel.late > 0.0:
                 kind = (channel.filter.type, channel.filter.order) if channel.filter else ("", 0)
                 alone = 0.0 if channel.filter else channel.late
@@ -204,7 +204,7 @@ def reshaped(record: Record, group: Group, there: Mapping[Name, Mask]) -> Record
     for _ in range(ROUNDS if counted else 0):
         spectra = [one for lab, fit in now.fits if (one := spectra_of(lab, fit, record, counted))]
         late = group.channel.late
-        known_as, sharp = bare(NOTHING_STATED, late), smooth(late)
+        known_as, sharp = ImportedChannel(delay=late), smooth(late)
         every = dict.fromkeys([*likeliest(spectra, group), sharp, known_as])
         by_labs = {one: nominal_fits(group.tried(record, one), there, near=now) for one in every}
         first = sorted(by_labs, key=lambda one: by_labs[one].surprise(own))[:FINALISTS]
@@ -250,18 +250,6 @@ def family(channel: ImportedChannel) -> str:
     if channel.filter.order == 1:
         return "first order"
     return "rippling" if channel.filter.type in RIPPLING else channel.filter.type
-
-
-def bare(channel: ImportedChannel, late: float) -> ImportedChannel:
-    """The filter and mean of a channel with a delay (s) and nothing else."""
-    return replace(
-        NOTHING_STATED,
-        filter=channel.filter,
-        average=channel.average,
-        means=channel.means,
-        smooth=channel.smooth,
-        delay=late,
-    )
 
 
 def smooth(late: float) -> ImportedChannel:

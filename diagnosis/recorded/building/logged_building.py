@@ -145,14 +145,13 @@ class LoggedBuilding(Building):
         size = max(1, min(round(self.shortest / (PER_PERIOD * self._interval)), ticks // FEWEST))
         system = System(self._plan)
         systems = [system, *(one.moved(system, 1.0) for one in self.nuisances)]
-        left = np.stack([self.left(one)[stretch] for one in systems])[:, : ticks // size * size]
-        sums = left.reshape(len(systems), -1, size, left.shape[2]).sum(axis=2) / math.sqrt(size)
+        sums = np.stack([summed(self.left(one)[stretch], size) for one in systems])
         rest, *others = sums.reshape(len(systems), -1)
         if others:
             usual = math.sqrt(white_noise(sums[0]) / sums.shape[2])
             rest = rest - within_tolerances(rest, np.stack(others, axis=1) - rest[:, None], usual)
-        level = float(np.mean(np.square(rest))) * left.shape[2]
-        fastest = max(1, math.ceil(0.5 / (self._interval * self.passed)))
+        level = float(np.mean(np.square(rest))) * sums.shape[2]
+        fastest = max(1, math.ceil(0.5 / (self._interval * self.cutoff)))
         rest, motion = (
             np.diff(summed(x[stretch], fastest), n=4, axis=0)[::5] for x in (self.left(), self.measured)
         )
@@ -210,10 +209,10 @@ class LoggedBuilding(Building):
 
         The highest frequencies of ticks hold less where a converter or a spline through rows took some of it.
         """
-        return np.full(len(self.signals), min(self.passed, HALF / (2.0 * self._interval)))
+        return np.full(len(self.signals), min(self.cutoff, HALF / (2.0 * self._interval)))
 
     @property
-    def passed(self) -> float:
+    def cutoff(self) -> float:
         """Frequency up to which filters passed noise, Hz: those of forces, all of them where these are alike.
 
         A motion whose numbers were logged more slowly than at every tick has none beyond half their rate.
