@@ -135,6 +135,7 @@ def test_the_filter_of_a_logger_is_told_by_all_frequencies(
     assert gapless(found)
     (said,) = logger.passed(Diagnosis(found))
     assert channel.filter.type.title() in said
+    assert list(found.passed) == sorted(found.passed)  # of a set in any order, whose names are printed
 
 
 @pytest.mark.long
@@ -162,11 +163,15 @@ def test_a_converter_may_take_off_the_delay_of_its_filter(whole: Record) -> None
     assert channels_of(found) == {replace(NOTHING_STATED, smooth=True)}
     assert found.late == NOT_LATE
     assert gapless(found)
+    (said,) = shapes.remarks(Diagnosis(found))
+    assert "damper_force" in said
+    assert "show nothing of what machines do between the ticks" in said
 
 
 def test_readings_at_the_ticks_passed_nothing(whole: Record) -> None:
     found = shapes.shaped(filters.filtered(logged(whole, lambda x: x)))
     assert (found.passed, found.late) == ({}, NOT_LATE)
+    assert shapes.remarks(Diagnosis(found)) == []
 
 
 @pytest.mark.long
@@ -193,7 +198,9 @@ def test_a_stated_filter_may_have_been_given_the_ticks_alone(given: Passed, whol
     }
     metadata = {IMPORT: {"data": "a.csv", "channels": json.dumps(channels)}}
     record = replace(record, run=replace(record.run, metadata=record.run.metadata | metadata))
-    assert bool(shapes.shaped(record).at_ticks) == at_ticks
+    found = shapes.shaped(record)
+    assert bool(found.at_ticks) == at_ticks
+    assert bool(shapes.remarks(Diagnosis(found))) == at_ticks
 
 
 CHANNELS = {

@@ -11,7 +11,7 @@ import numpy as np
 from common.recording.imported import ImportedChannel, LoggerFilter
 from diagnosis.findings.certainty.covariances import FOREIGN, covariance
 from diagnosis.findings.found import Diagnosis
-from diagnosis.findings.logged import delays, means
+from diagnosis.findings.logged import delays, means, shapes
 from diagnosis.findings.sensors import readings
 from diagnosis.findings.verdict import UNNAMED, PartVerdict
 from diagnosis.fits import fitting, hypothesis, residuals
@@ -130,6 +130,7 @@ def remarks(found: Diagnosis) -> list[str]:
     return [
         *passed(found),
         *means.remarks(found),
+        *shapes.remarks(found),
         *delays.remarks(found),
         *timed(found),
         *gained(found),

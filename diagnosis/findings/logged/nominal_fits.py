@@ -43,7 +43,7 @@ class NominalFits(NamedTuple):
 
     def surprise(self, counted: Iterable[Name]) -> float:
         """−2·log of how probable those readings and the nominal parameters are, up to a constant."""
-        return sum(self.of[name] for name in counted) + sum(fit.prior for _, fit in self.fits)
+        return sum(self.of[name] for name in sorted(counted)) + sum(fit.prior for _, fit in self.fits)
 
     def far_likelier(self, other: NominalFits, counted: Collection[Name]) -> bool:
         """Whether the readings are far likelier than in another one, and none is much less likely.

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from common.recording.imported import NOTHING_STATED, RIPPLING, ImportedChannel, LoggerFilter
+from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged.filters import ANY_GAIN
 from diagnosis.findings.logged.nominal_fits import (
     BANDS,
@@ -67,7 +68,7 @@ class Group(NamedTuple):
         """The record with these readings behind another one."""
         passed = {name: one for name, one in record.passed.items() if name not in self.names}
         if channel.blunt:
-            passed |= dict.fromkeys(self.names, replace(channel, delay=0.0))
+            passed |= dict.fromkeys(sorted(self.names), replace(channel, delay=0.0))
         late = record.late
         if self.free:
             signals = {named: signal for lab in record.labs for named, signal in signals_of(lab)}
@@ -297,3 +298,19 @@ def spectra_of(lab: Part, fit: Fit, record: Record, counted: Iterable[Name]) -> 
 def signals_of(lab: RecordedLaboratory) -> list[tuple[Name, str]]:
     """Topic and name of a laboratory's readings, each with its signal in the record."""
     return [((lab.role, name), lab.signal(name)) for name in lab.kind.channels.names]
+
+
+def remarks(found: Diagnosis) -> list[str]:
+    """Sentences where readings passed a filter that is seen by what is faster than the ticks alone."""
+    record = found.record
+    ended = [name for (_, name), one in record.passed.items() if one.smooth]
+    said = [
+        f"{' and '.join(ended)} show nothing of what machines do between the ticks, as behind a converter's own filter "
+        "that delays by no more than was found or stated. It was taken into account."
+    ]
+    digital = [name for _, name in sorted(record.at_ticks)]
+    given = [
+        f"The filter of {' and '.join(digital)} was given the readings at the ticks alone, as a controller's own is, by "
+        "what machines do between the ticks. It was taken into account."
+    ]
+    return (said if ended else []) + (given if digital else [])
