@@ -310,7 +310,7 @@ def remarks(found: Diagnosis) -> list[str]:
     ]
     digital = [name for _, name in sorted(record.at_ticks)]
     given = [
-        f"The filter of {' and '.join(digital)} was given the readings at the ticks alone, as a controller's own is, by "
-        "what machines do between the ticks. It was taken into account."
+        f"The filter of {' and '.join(digital)} was given the readings at the ticks alone, as a controller's own is, "
+        "by what machines do between the ticks. It was taken into account."
     ]
     return (said if ended else []) + (given if digital else [])
