@@ -17,7 +17,7 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged import filters, logger, means, shapes
 from diagnosis.fits import fitting, residuals, settling, worth
 from diagnosis.recorded.parts import LaboratoryPart
-from diagnosis.recorded.record import NOT_LATE, Record
+from diagnosis.recorded.record import NOT_LATE, Delay, Late, Record
 from loop import replay
 from models.registry import Array
 from models.system import System
@@ -74,17 +74,25 @@ def finely(part: LaboratoryPart) -> Array:
 
 
 def logged(
-    whole: Record, passed: Passed, early: float = 0.0, stated: Mapping[str, float] | None = None
+    whole: Record,
+    passed: Passed,
+    early: float = 0.0,
+    stated: Mapping[str, float] | None = None,
+    factor: float = 1.0,
 ) -> Record:
     """An import of the laboratories of the plan behind a logger's filter, with the same statement on each channel.
 
-    The logger takes a delay of `early` s off.
+    The logger takes a delay of `early` s off. The table has `factor` times the planned
+    frequency and damping.
     """
     signals = {name: values for name, values in whole.signals.items() if name not in UNKNOWN_TO_A_LOGGER}
     channels: dict[str, dict[str, Mapping[str, float]]] = {}
     taken = round(early * RATE)
     for number, part in enumerate((lab_a(whole), lab_b(whole))):
-        fine = finely(part)
+        plan = part.lab.plan
+        frequency, damping = factor * plan.table.frequency, factor * plan.table.damping_ratio
+        table = replace(plan.table, frequency=frequency, damping_ratio=damping)
+        fine = finely(part.replaced(lab=replace(part.lab, plan=replace(plan, table=table))))
         read = np.concatenate([passed(fine)[taken:], fine[len(fine) - taken :]])[::STEPS]
         noise = NOISE * np.std(read, axis=0) * white(40 + number, *read.shape)
         signals |= dict(zip(part.signals, (read + noise).T, strict=True))
@@ -183,6 +191,29 @@ def test_a_slow_table_is_no_filter_of_the_logger(cases: Cases) -> None:
     alone = replace(record, labs=tuple(lab for lab in record.labs if lab.role != MASTER))
     for one in (record, alone):
         assert shapes.shaped(filters.filtered(one)).passed == {}
+
+
+@pytest.mark.long
+def test_a_stated_delay_beside_a_table_at_fault_is_a_delay(whole: Record) -> None:
+    """A filter that is late by as much would tell a part of what the table does."""
+    late = round(3e-3 * RATE)
+    record = logged(
+        whole,
+        lambda x: np.concatenate([np.repeat(x[:1], late, axis=0), x[:-late]]),
+        stated={"delay": 3e-3},
+        factor=0.8,
+    )
+    alone = replace(record, labs=tuple(lab for lab in record.labs if lab.role != MASTER))
+    for one in (record, alone):
+        assert not any(found.filter or found.average for found in channels_of(shapes.shaped(one)))
+
+
+@pytest.mark.long
+def test_all_readings_passed_what_some_of_them_did_where_that_is_likelier(whole: Record) -> None:
+    record = logged(whole, RIPPLING)
+    found = shapes.shaped(replace(record, late=Late(motion=Delay(4.3e-3))))  # nothing is known of forces
+    assert len(found.passed) == 6
+    assert len(channels_of(found)) == 1
 
 
 @pytest.mark.parametrize(
