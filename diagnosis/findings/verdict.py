@@ -174,11 +174,16 @@ def how_well(search: Search) -> Outcome:
 
 
 def falls_short(search: Search) -> bool:
-    """Whether effects leave more than noise, strain nominal parameters or explain too small a gap."""
+    """Whether effects leave more than noise, strain nominal parameters, explain too small a gap or stand elsewhere.
+
+    What a small gap has beside an error of one reading may be too small to be seen in another one, which then tells
+    the site all the same.
+    """
     fit = search.chosen
     strained = bool(pinned(fit)) or farthest(fit) < HALF or bool(at_end(fit))
     everywhere = fitting.at(replace(fit.data, vague=None), fit.values, fit.z)  # behind impacts as well
-    return strained or leaves(everywhere, allowed(search)) or unproven(search) or small(search)
+    elsewhere = of_readings(search) and misplaced(search)
+    return strained or leaves(everywhere, allowed(search)) or unproven(search) or small(search) or elsewhere
 
 
 def imitated(search: Search) -> bool:
@@ -197,10 +202,13 @@ def artefact(search: Search) -> bool:
     A sensor errs by a simple law, so that what such an error explains in part has another cause. Where a logger
     recorded, which may do anything to its channels, that does not follow.
     """
-    data = search.data
-    kinds = {data.catalogue[name].kind for name in search.chosen.names}
-    logged = any(isinstance(item, LoggedReadings) for item in data.part.nuisances)
-    return kinds == {"measurement"} and not logged and search.explained < 1.0 - TRUE_LEAVES
+    logged = any(isinstance(item, LoggedReadings) for item in search.data.part.nuisances)
+    return of_readings(search) and not logged and search.explained < 1.0 - TRUE_LEAVES
+
+
+def of_readings(search: Search) -> bool:
+    """Whether nothing but errors of readings is named."""
+    return {search.data.catalogue[name].kind for name in search.chosen.names} == {"measurement"}
 
 
 def trifling(search: Search) -> bool:

@@ -74,7 +74,7 @@ BRISTLED = FURTHER | {
         "m",
         null=0.0,
         least=1e-6,
-        most=0.005,
+        most=0.02,
         sizes=(3e-05, 0.0005),
         says="distance over which the force of laws 2 and 3 approaches its size after a reversal",
         shape=True,

@@ -16,11 +16,12 @@ from diagnosis.findings.certainty.other_causes import other_causes
 from diagnosis.findings.sensors.own_reading import gives_energy
 from diagnosis.findings.sites import functions, likely
 from diagnosis.findings.sites.likely import APART, likely_sites, ranked
-from diagnosis.findings.verdict import judge, misplaced
+from diagnosis.findings.verdict import how_well, judge, misplaced
 from diagnosis.fits import fitting, hypothesis, residuals
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.residuals import Data
 from diagnosis.fits.search import Search
+from diagnosis.fits.unexplained import leaves, model_error
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
@@ -218,6 +219,18 @@ def test_effects_elsewhere_that_explain_less_than_an_unknown_one_are_not_named(c
     assert not misplaced(
         replace(found, chosen=fitting.fit(data, {"actuator.gain": {"factor": 0.95}}, bare.z))
     )
+
+
+def test_an_error_of_a_reading_that_leaves_only_noise_does_not_explain_a_gap_of_the_machine(
+    cases: Cases,
+) -> None:
+    part, data, nominal = predicted(cases, lab_a)
+    machine = commanded(part, 0, softer).predict(data.system) - nominal
+    bare = judged(part, data, nominal + 0.028 * machine)
+    soft = {"sensor.column_displacement.saturation": {"limit": 0.05, "sharpness": 2.0}}
+    found = Search(data, bare, fitting.fit(data, soft, bare.z), ())
+    assert not leaves(found.chosen, model_error(found.chosen))
+    assert how_well(found) == "partly"
 
 
 def test_a_force_of_the_damper_is_misplaced_where_the_gap_is_a_function_of_the_stroke_that_is_read(
