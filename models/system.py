@@ -159,6 +159,7 @@ class DamperEffects:
     force_limit: float = math.inf  # N
     force_limit_sharpness: float = math.inf  # of the bend there, as in `models.saturation`
     offset: float = 0.0  # N, a constant force on the moving mass
+    offset_outside: float = 0.0  # 1 where its reaction acts elsewhere than on the table
     motor_damping: float = math.inf  # ratio of a motor of second order, infinite for one of first order
     asymmetry: float = 0.0  # share by which the dashpot is stronger in the positive direction
     damping_exponent: float = 1.0  # n of a dashpot whose force grows with the speed to the power of n

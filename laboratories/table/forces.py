@@ -33,6 +33,7 @@ from laboratories.table.record import (
     GAP,
     GUIDE,
     HELD,
+    LEANED,
     OFFSET,
     OPENING,
     PRESLIDING,
@@ -136,7 +137,7 @@ def resist(columns: Array, lab: TableLab, length: float) -> None:
     limits, state, size = lab.limits, lab.state, columns.shape[0] - INPUTS
     rail, drag = size + 3, size + 4
     state[rail] = -limits[OFFSET]
-    state[drag] = 0.0
+    state[drag] = limits[LEANED]
     middle = state[STROKE] + 0.5 * columns[STROKE_RATE, STROKE] * state[STROKE_RATE]
     if abs(middle) > limits[STOP]:  # at the segment's middle, with which a bounce conserves energy
         state[rail] += stops.force(

@@ -46,6 +46,7 @@ from laboratories.table.record import (
     LAST_VELOCITY,
     MEMORIES,
     MOTOR_GAIN,
+    OUTSIDE,
     PLAY,
     PLAYED,
     PRESENT,
@@ -102,7 +103,7 @@ def build(
     limits += [on_damper.force_limit_sharpness]
     limits += [*valve(table, on_table), on_damper.asymmetry, *behind_coupling, on_table.presliding]
     limits += [*fed(interval, table, on_table), on_table.velocity_limit_sharpness]
-    limits += [on_damper.damping_exponent, on_damper.stiffening]
+    limits += [on_damper.damping_exponent, on_damper.stiffening, *borne(table, on_table, on_damper)]
     return TableLab(
         taps,
         walk,
@@ -134,6 +135,14 @@ def valve(table: ShakingTable, effects: TableEffects) -> tuple[float, float, flo
         return math.inf, 0.0, 0.0
     omega, twice = 2.0 * math.pi * table.frequency, 2.0 * table.damping_ratio
     return effects.velocity_limit, omega / twice, twice * omega
+
+
+def borne(table: ShakingTable, on_table: TableEffects, on_damper: DamperEffects) -> tuple[float, float]:
+    """What `limits` holds of a constant force on the damper from outside the table, from place `OUTSIDE` on."""
+    outside = on_damper.offset_outside * on_damper.offset
+    if on_table.compliance == 0.0:
+        return outside, 0.0
+    return outside, on_table.compliance * (2.0 * math.pi * table.frequency) ** 2 * outside
 
 
 def fed(interval: float, table: ShakingTable, effects: TableEffects) -> tuple[float, float, float, float]:
@@ -198,6 +207,7 @@ def advance(lab: TableLab, command: float, motor_command: float) -> tuple[float,
         state[last] = velocity
     force = spring[0] * state[STROKE] + spring[1] * state[STROKE_RATE] + state[rail] - state[MOTOR]
     force += state[size + INPUTS + HELD]  # which acts between the two masses
+    force += limits[OUTSIDE]
     return state[TABLE], state[ACCELERATION], state[STROKE], force
 
 

@@ -34,6 +34,9 @@ TABLE_PRESLIDING = 36  # m, of the table's friction
 FED, FED_TICKS, FED_VELOCITY, FED_ACCELERATION = 37, 38, 39, 40
 FASTEST_SHARPNESS = 41  # of the bend at the loop's highest speed
 DAMPING_EXPONENT, STIFFENING = 42, 43  # of the damper's dashpot and spring, the latter 1/m²
+# of the constant force on the damper's mass: what has its reaction elsewhere than on the table N, and the acceleration
+# by which a compliant table gives way to that m/s²
+OUTSIDE, LEANED = 44, 45
 
 # places in `state` behind the states and inputs
 PLAYED, LAST_VELOCITY, BRISTLES, APART, APART_RATE, HELD, TABLE_BRISTLES, LAST_COMMAND, FED_RATE = range(9)

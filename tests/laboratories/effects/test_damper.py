@@ -26,6 +26,7 @@ from tests.laboratories.effects.histories import (
     SHORT,
     STROKE,
     STROKE_RATE,
+    Y,
     Array,
     phasor,
     run_b,
@@ -213,6 +214,18 @@ def test_a_constant_force_deflects_the_damper_as_in_statics(force: float) -> Non
     more = DamperEffects(offset=force)
     pushed = run_b(np.zeros(200), damper=quick, table_effects=table, damper_effects=more)
     assert np.allclose(pushed, driven, rtol=1e-12, atol=1e-12)
+
+
+@given(force=st.floats(-50.0, 50.0))
+@settings(max_examples=10)
+def test_a_constant_force_from_outside_goes_through_the_spring_into_the_table(force: float) -> None:
+    damper, table = Damper(damping=60.0), TableEffects(compliance=2.5e-5)
+    more = DamperEffects(offset=force, offset_outside=1.0)
+    got = run_b(np.zeros(6000), damper=damper, table_effects=table, damper_effects=more)
+    assert got[-1, STROKE] == pytest.approx(force / 56.8, rel=1e-3, abs=1e-9)
+    assert got[-1, FORCE] == pytest.approx(force, rel=1e-3, abs=1e-9)
+    assert got[-1, Y] == pytest.approx(2.5e-5 * force, rel=1e-3, abs=1e-12)
+    assert abs(got[0, FORCE]) < 0.01 * abs(force) + 1e-9  # at first none of it is there
 
 
 FREE = Damper(mass=16.0, stiffness=0.0, damping=0.0)
