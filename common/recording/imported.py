@@ -16,6 +16,7 @@ Values that the import map does not state are zero or None, which means that the
 
 from __future__ import annotations
 
+import cmath
 import json
 import math
 from collections.abc import Mapping
@@ -90,11 +91,7 @@ class LoggerFilter:
         at_once = _modes(self.type, self.order, self.ripple, self.attenuation)[2]
         result = np.asarray(values[0] + at_once * (values - values[0]), dtype=np.float64)
         for pole, weight in zip(*self.modes, strict=True):
-            step = pole * interval
-            kept = np.exp(step)
-            ramp = weight / (pole * step)
-            now, before = ramp * (np.expm1(step) - step), ramp * (1.0 + kept * (step - 1.0))
-            result += signal.lfilter([now, before], [1.0, -kept], moved).real
+            result += signal.lfilter(*_section(complex(pole) * interval, complex(weight) / pole), moved)
         return result
 
 
@@ -386,6 +383,20 @@ def _modes(
     upper = poles.imag >= 0.0
     paired = np.where(poles.imag > 0.0, 2.0, 1.0)[upper] * weights[upper]
     return poles[upper], paired, gain if zeros.size == poles.size else 0.0
+
+
+def _section(step: complex, weight: complex) -> tuple[list[float], list[float]]:
+    """Coefficients over ticks of the real part of weight·p/(s − p) with step = p·interval, for straight lines.
+
+    With a = p·interval, k = eᵃ and z⁻¹ a tick before, weight·((k − 1 − a) + (1 + k·(a − 1))·z⁻¹)/(a·(1 − k·z⁻¹)).
+    """
+    kept = cmath.exp(step)
+    now = weight / step * complex(np.expm1(step) - step)
+    before = weight / step * (1.0 + kept * (step - 1.0))
+    if step.imag == 0.0:
+        return [now.real, before.real], [1.0, -kept.real]
+    across = [now.real, (before - now * kept.conjugate()).real, -(before * kept.conjugate()).real]
+    return across, [1.0, -2.0 * kept.real, abs(kept) ** 2]
 
 
 def _plain(channel: ImportedChannel) -> dict[str, Any]:
