@@ -19,6 +19,7 @@ from diagnosis.recorded.commands import followed
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.logger.finer import Finer
 from diagnosis.recorded.logger.through import through_logger
+from diagnosis.recorded.logger.unseen import between_shown, shown
 from diagnosis.recorded.nuisances import (
     BETWEEN,
     CALIBRATED,
@@ -198,6 +199,24 @@ class LaboratoryPart:
             self.freed = self.signals.index(lab.signal(lab.kind.free))
         if self.anew is not None and not lab.kind.drifts(lab.plan) and self.rested(record.systems[lab.role]):
             self.anew = None
+        self.blurred = self.unseen(record)
+
+    def unseen(self, record: Record) -> Array | float:
+        """Rms (signals,) of what commands may have moved of which a logger with slow rows showed every few ticks.
+
+        It is that of the plan's laboratory under a draw of the noise that such rows show.
+        """
+        target, seed = self.lab.signal(self.lab.kind.channels.target.name), record.plan.test.seed
+        more = dict(self.inputs)
+        for place, (name, values) in enumerate(self.inputs.items()):
+            ticks = shown(record, self.role, name if record.has(name) else target)
+            if ticks is not None:
+                more[name] = values + between_shown(values, ticks, seed + place)
+        if all(more[name] is values for name, values in self.inputs.items()):
+            return 0.0
+        plan = System(self.lab.plan)
+        moved = self.replaced(inputs=more).predict(plan) - self.predict(plan)
+        return np.asarray(np.sqrt(np.mean(np.square(moved), axis=0)))
 
     def targets(self, record: Record) -> dict[str, Array]:
         """What moves the laboratory, by command, without the noise of its sensors that a controller feeds back.

@@ -29,13 +29,14 @@ def under_less_noise(search: Search) -> tuple[Search, str]:
     """A search whose effects, if any, are held against less noise where coloured noise may hide an unknown effect.
 
     That is white noise where several readings have the noise as they would follow from one motion: it is that motion.
-    For a lone reading it is the noise that all readings have; with it goes the reading of which that is doubtful, empty
+    Where commands that no row showed make such a motion, it says nothing. For a lone reading it is the noise that all readings have; with it goes the reading of which that is doubtful, empty
     where there is none or where the effects explain it as well.
     """
     if not sensor_noise.coloured(search.chosen.data):
         return search, ""
     data, name = sensor_noise.whitened(search.chosen), ""
-    if not moves(fitting.at(data, search.chosen.values, search.chosen.z)):
+    unseen = bool(np.any(sensor_noise.moved_unseen(data)))
+    if unseen or not moves(fitting.at(data, search.chosen.values, search.chosen.z)):
         name = lone_noise(search.chosen)
         if not name:
             return search, ""

@@ -42,6 +42,7 @@ LOUDER = 4.0
 # Of the noise at the highest frequencies before a test, up to which it is that of the test: both are known to 3 %, and
 # readings that were moved in time have less.
 AS_LOUD = 1.08
+UNSEEN = 0.2  # of the noise at the highest frequencies, from which on what moves a part unseen counts beside it
 LOWER = 0.9  # of the noise first found, from which on a lower one is believed
 
 
@@ -242,12 +243,13 @@ def before_the_test(data: Data, place: int) -> NoiseModel | None:
     """The noise of one signal by its readings at rest before the test, None where none are kept.
 
     Its level is that of the highest frequencies in the test. It is none where the sensor is far louder or quieter
-    there: a pump that did not run, or a converter whose noise lies below its step.
+    there: a pump that did not run, or a converter whose noise lies below its step. So it is where commands that no row
+    showed move the part by as much as noise, which they do in the test alone.
     """
     kept = data.part.rest[place] if isinstance(data.part, LaboratoryPart) else None
     flat, interval = float(data.white[place]), data.system.plan.test.interval
     groups = 0 if kept is None else kept.size // data.group
-    if kept is None or groups < 2 * colour.SEGMENT:
+    if kept is None or groups < 2 * colour.SEGMENT or moved_unseen(data)[place]:
         return None
     still = kept - kept.mean()
     still = still - pickup.waves(still, pickup.pickups(still, interval), interval)
@@ -265,6 +267,11 @@ def before_the_test(data: Data, place: int) -> NoiseModel | None:
     tails = colour.heaviness(colour.whitened(averaged[:, None], gains)[:, 0])
     rms = float(still.std())
     return NoiseModel(rms, "ar", order, "at rest", density=density, samples=groups, tails=tails)
+
+
+def moved_unseen(data: Data) -> Mask:
+    """Which signals (signals,) move by some of their noise where nothing that was recorded says so."""
+    return np.asarray(data.part.blurred > UNSEEN * data.white)
 
 
 def alike(noise: Array, quiet: Mask) -> bool:

@@ -8,16 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_interp_spline
 
-from common.recording.imported import ImportedData
 from common.roles import MASTER
+from diagnosis.recorded.logger.unseen import shown
 from diagnosis.recorded.record import Record
 from models.registry import Array
 
 MOTION = ("displacement", "velocity", "acceleration")
 GROUND = "ground_acceleration"
-# Rows in an interval, below which they pass over ticks that count. Of faster rows near the ticks the times hardly tell
-# which ticks they showed, and nearly all were.
-SLOWER = 0.9
 # Degree of the spline of which slopes at slow rows are taken: at ten rows in a period the slope of a cubic one errs by
 # 0.1 %, its bend by 3 %, those of this one by 2e-7 and 2e-6.
 DEGREE = 7
@@ -30,7 +27,7 @@ def of_storeys(record: Record, rows: Mapping[str, Array]) -> dict[str, Array]:
     slower than ticks. A velocity that such rows show without the acceleration counts as not recorded, since they take
     motion faster than half their rate for a slower one, of which a velocity has more than a displacement.
     """
-    interval, seen = record.plan.test.interval, shown(record, "displacement")
+    interval, seen = record.plan.test.interval, shown(record, MASTER, "displacement")
     if seen is None or seen.size <= DEGREE:
         return differences(rows["displacement"], interval) | dict(rows)
     found = slopes(rows["displacement"], seen, interval)
@@ -45,14 +42,6 @@ def slopes(displacement: Array, seen: NDArray[np.int64], interval: float) -> dic
         spline = CubicSpline(when, smooth.derivative(order)(when))
         found[name] = np.asarray(spline(interval * np.arange(len(displacement))))
     return found
-
-
-def shown(record: Record, name: str) -> NDArray[np.int64] | None:
-    """The ticks at which rows that are slower than ticks showed a number of the master; None where they are not."""
-    interval = record.plan.test.interval
-    channel = (record.stated or ImportedData("")).channel(MASTER, name)
-    slow = channel.interpolated and 0.0 < channel.rate * interval < SLOWER
-    return channel.seen(record.ticks, interval) if slow else None
 
 
 def differences(displacement: Array, interval: float) -> dict[str, Array]:

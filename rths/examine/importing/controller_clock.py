@@ -100,9 +100,16 @@ class ControllerClock(NamedTuple):
         return t[there], values[nearest[there]]
 
     def seen(self, times: Array, values: Array) -> tuple[Array, Array]:
-        """The ticks (m,), s by the controller, whose values (m,) were in force at times (n,) of the logger, s."""
+        """The ticks (m,), s by the controller, whose values (m,) were in force at times (n,) of the logger, s.
+
+        A row that may be either side of a tick is left out where rows drift past the ticks.
+        """
         places = self.places(times)
-        at_ticks = bool(np.all(np.abs(places - np.rint(places)) < ROUNDED))
+        beside = np.abs(places - np.rint(places))
+        at_ticks = bool(np.all(beside < ROUNDED))
+        if self.between and not at_ticks:
+            sure = beside > ON_TICK
+            places, values = places[sure], values[sure]
         ticks, rows = np.unique(
             np.rint(places) if at_ticks else np.floor(places + self.slack), return_index=True
         )

@@ -1,0 +1,41 @@
+"""Commands of a controller that a data logger with slower rows did not record."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from common.recording.imported import ImportedData
+from diagnosis.recorded.record import Record
+from models.registry import Array
+
+# Rows in an interval, below which they pass over ticks that count. Of faster rows near the ticks the times hardly tell
+# which ticks they showed, and nearly all were.
+SLOWER = 0.9
+# Weights of a value and of the four around it in what a cubic through these misses it by.
+CUBIC = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
+
+
+def shown(record: Record, topic: str, name: str) -> NDArray[np.int64] | None:
+    """The ticks at which rows that are slower than ticks showed a number of a controller; None where they are not."""
+    interval = record.plan.test.interval
+    channel = (record.stated or ImportedData("")).channel(topic, name)
+    slow = channel.interpolated and 0.0 < channel.rate * interval < SLOWER
+    return channel.seen(record.ticks, interval) if slow else None
+
+
+def between_shown(command: Array, ticks: NDArray[np.int64], seed: int) -> Array:
+    """What a command (n,) may have had at ticks beside a spline through those at which it was shown, (n,).
+
+    A controller that feeds readings back has their noise in its command, and as much of it at the ticks that were not
+    shown. It is drawn as white noise of the size that neighbours tell: what a cubic through four of them misses.
+    """
+    ticks = ticks[ticks < command.size]
+    if ticks.size < CUBIC.size:
+        return np.zeros(command.size)
+    missed = np.convolve(command[ticks], CUBIC, "valid")
+    size = float(np.sqrt(np.mean(np.square(missed)) / np.sum(np.square(CUBIC))))
+    noise = size * np.random.default_rng(seed).standard_normal(command.size)
+    smooth = CubicSpline(ticks, noise[ticks])(np.clip(np.arange(command.size), ticks[0], ticks[-1]))
+    return np.asarray(noise - smooth)
