@@ -28,6 +28,7 @@ BLOCK = 100  # ticks, in which a clock gains little
 MISSED = 0.05
 ROUNDED = 0.03  # of an interval, by which the others may be missed
 ON_TICK = 0.01  # of an interval, within which the first row is on its tick
+BESIDE = 0.25  # share of what rows are closer than ticks, within which a row is on its tick
 TOWARDS = 0.1  # of an interval
 STEADY = 0.2  # share of the usual width of bounds that all of them have in common, of a clock that is in step
 FASTEST, STEP = 1e-3, 5e-7  # of clocks: what any errs by at most, and between rates that are tried
@@ -76,8 +77,10 @@ class ControllerClock(NamedTuple):
     def holds(self, times: Array, values: Array) -> bool:
         """Whether values (n,) at times (n,) of the logger, s, change from tick to tick and not between."""
         place = self.places(times)
-        between = np.abs(place - np.round(place)) > ROUNDED
-        together = np.floor(place[1:] + ROUNDED) == np.floor(place[:-1] + ROUNDED)
+        # rows of hardly more than one in an interval share a tick where one is just behind it and one just before the next
+        slack = min(ROUNDED, BESIDE * abs(1.0 - float(np.median(np.diff(place)))))
+        between = np.abs(place - np.round(place)) > slack
+        together = np.floor(place[1:] + slack) == np.floor(place[:-1] + slack)
         sure = together & between[1:] & between[:-1]
         if np.count_nonzero(sure) > OFTEN * np.count_nonzero(together):
             together = sure  # where rows are on ticks by chance only, these may show either value
@@ -141,7 +144,7 @@ def clock_of(
     channels do not say which tick is the first one; a clock that is `known` roughly does.
     """
     ratio = float(np.median(np.diff(times))) / interval if times.size > 1 else 1.0
-    if ratio > 1.0 - ROUNDED:
+    if ratio > 1.0 - ON_TICK:
         return None
     for values in sorted(channels, key=lambda one: -np.count_nonzero(np.diff(one))):
         found = clock_by_changes(times, values, interval, known)
