@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from common.plan.kinds import COLUMN
 from diagnosis.findings.sensors.common_noise import in_common
 from diagnosis.findings.sites import functions
 from diagnosis.findings.sites.signatures import Signature, Spectrum, signatures
@@ -20,8 +21,11 @@ from diagnosis.fits.hypothesis import TOLERANCES
 from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.residuals import Data
 from diagnosis.recorded.joined import laboratory_of
+from diagnosis.recorded.parts import LaboratoryPart
 from laboratories.effects.sites import is_sensor
+from loop import replay
 from models.registry import Array
+from models.system import System
 
 # Of a residual's rms in a band, by which a signature may err: nominal parameters are known to 2 %, and the phase of a
 # damped resonance reacts to them several times as much.
@@ -36,6 +40,9 @@ RARE = 60.0
 # set "tune" and on effects of no catalogue stand-ins explained 0.59 to 0.93 of it where no nominal parameter was at its
 # bound, true mechanisms 0.95 to 1.00.
 TRUE_LEAVES = 0.06
+# Times what a force is missed by when the plan's command moves its specimen, below which the motion that was read tells
+# it: a fault of specimen or load cell leaves as much by either, and one of the actuator what tolerances leave.
+NEARER = 0.5
 NARROWEST, RELATIVE, FEWEST = 0.5, 6.0, 4  # bands: Hz, frequency over width, and lines at least
 END = 1.5  # s, over which the end is faded out, so that a motion that goes on there does not wrap around
 ROUNDS = 3  # in which parameters and the bands' energies are found in turn
@@ -101,12 +108,35 @@ def ranked(fit: Fit) -> list[LikelySite]:
         fit = fitting.at(in_common(fit), fit.values, fit.z)
     given = spectra(fit)
     system = hypothesis.lay(fit.data, fit.z, fit.values)
-    found = [site_cost(given, item) for item in signatures(part, system, given.frequencies)]
+    exact = follows_motion(part, system)
+    found = [
+        site_cost(given, item)
+        for item in signatures(part, system, given.frequencies)
+        if item.site not in exact
+    ]
     rows = sorted((item for item in found if item is not None), key=lambda item: item.cost)
     best: dict[str, LikelySite] = {}
     for row in rows:
         best.setdefault(row.site, row._replace(cost=row.cost - rows[0].cost))
     return list(best.values())
+
+
+def follows_motion(part: LaboratoryPart, system: System) -> tuple[str, ...]:
+    """The sites of a specimen and its load cell where its force follows from the motion that was read, else none.
+
+    A signature is of small changes. Where a specimen yields, what shakes its actuator changes where it stands
+    afterwards, and its force with that.
+    """
+    lab = part.lab
+    if lab.kind.name != COLUMN or not part.present.any(axis=0).all():
+        return ()
+    motion, force = part.measured.T
+    there = part.present.all(axis=1)
+    by_motion = (force - replay.column(system, motion))[there]
+    by_command = (force - part.predict(system)[:, 1])[there]
+    if float(np.linalg.norm(by_motion)) > NEARER * float(np.linalg.norm(by_command)):
+        return ()
+    return lab.site(COLUMN), lab.sensor(lab.kind.channels.force)
 
 
 def spectra(fit: Fit) -> Spectra:

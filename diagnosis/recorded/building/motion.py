@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_interp_spline
 
+from common.recording.imported import ImportedData
 from common.roles import MASTER
 from diagnosis.recorded.logger.unseen import shown
 from diagnosis.recorded.record import Record
@@ -65,7 +66,7 @@ def of_ground(record: Record) -> Array:
     Equations of motion hold of what they all are by one. An acceleration that follows from slow displacements has none
     of the ground's motion above half the rate of the rows.
     """
-    values, seen = record.signals[GROUND], shown(record, GROUND)
+    values, seen = record.signals[GROUND], shown(record, MASTER, GROUND)
     channel = (record.stated or ImportedData("")).channel(MASTER, GROUND)
     if not channel.followed or seen is None:
         return values

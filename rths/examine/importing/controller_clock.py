@@ -28,8 +28,14 @@ BLOCK = 100  # ticks, in which a clock gains little
 MISSED = 0.05
 ROUNDED = 0.03  # of an interval, by which the others may be missed
 ON_TICK = 0.01  # of an interval, within which the first row is on its tick
-BESIDE = 0.25  # share of what rows are closer than ticks, within which a row is on its tick
+SHARP = 1e-3  # of an interval, by which rows that are hardly closer than ticks may be missed
 TOWARDS = 0.1  # of an interval
+# Of an interval, half the width of bounds below which they say on which side of a tick another one is: a row of hardly
+# less than an interval has its tick anywhere.
+TELLING = 0.4
+HARDLY = 0.15  # of an interval, by which rows are closer than ticks that share one too seldom to bound it well
+EQUAL = 1e-9  # s, below which two times are one
+SHARPER, ACROSS = (1e-1, 2e-2, 4e-3), 31  # of an interval, closer and closer, and beginnings and rates within it
 STEADY = 0.2  # share of the usual width of bounds that all of them have in common, of a clock that is in step
 FASTEST, STEP = 1e-3, 5e-7  # of clocks: what any errs by at most, and between rates that are tried
 OTHER = 0.01  # share of neighbours within one interval that may differ in a channel that holds
@@ -78,7 +84,7 @@ class ControllerClock(NamedTuple):
         """Whether values (n,) at times (n,) of the logger, s, change from tick to tick and not between."""
         place = self.places(times)
         # rows of hardly more than one in an interval share a tick where one is just behind it and one just before the next
-        slack = min(ROUNDED, BESIDE * abs(1.0 - float(np.median(np.diff(place)))))
+        slack = SHARP if hardly_faster(place, 1.0) else ROUNDED
         between = np.abs(place - np.round(place)) > slack
         together = np.floor(place[1:] + slack) == np.floor(place[:-1] + slack)
         sure = together & between[1:] & between[:-1]
@@ -105,14 +111,16 @@ class ControllerClock(NamedTuple):
     def seen(self, times: Array, values: Array) -> tuple[Array, Array]:
         """The ticks (m,), s by the controller, whose values (m,) were in force at times (n,) of the logger, s.
 
-        A row that may be either side of a tick is left out where rows drift past the ticks.
+        A single row that may be either side of a tick, as times are known to some µs only, is left out: its neighbours
+        tell what it had.
         """
         places = self.places(times)
         beside = np.abs(places - np.rint(places))
         at_ticks = bool(np.all(beside < ROUNDED))
         if self.between and not at_ticks:
             sure = beside > ON_TICK
-            places, values = places[sure], values[sure]
+            single = np.append(True, sure[:-1]) & np.append(sure[1:], True) & ~sure
+            places, values = places[~single], values[~single]
         ticks, rows = np.unique(
             np.rint(places) if at_ticks else np.floor(places + self.slack), return_index=True
         )
@@ -256,7 +264,39 @@ def clock_by_changes(
     centre = 0.5 * limits[1:].sum(axis=0) / interval
     begin = float(centre[0]) if known is None else known.begin / interval
     limits[1:] += interval * turns(centre, begin, passed(times, values, interval, limits[0]))
-    return within(limits, interval, turning=known is None)
+    found = within(limits, interval, turning=known is None)
+    near = high - low < 2.0 * TELLING * interval
+    hardly = hardly_faster(times, interval)
+    return sharpened(found, low[near], high[near]) if found and hardly else found
+
+
+def hardly_faster(times: Array, interval: float) -> bool:
+    """Whether there is hardly more than one row in an interval, at times (n,) in its unit."""
+    return float(np.median(np.diff(times))) > (1.0 - HARDLY) * interval
+
+
+def sharpened(clock: ControllerClock, low: Array, high: Array) -> ControllerClock:
+    """The clock, known roughly, within most of the bounds (runs,) of its ticks, s: in the middle of such clocks.
+
+    One that is in step stays so where it is within all of them.
+    """
+
+    def held(begin: Array, last: Array) -> Array:
+        """How many bounds are held by clocks that begin later by some s, and are later by others at the last bound."""
+        ends = clock.begin + begin[..., None] + last[..., None] * (ticks / max(1.0, ticks[-1]))
+        where = ends + (1.0 + clock.fast) * clock.interval * ticks
+        return np.count_nonzero((low - EQUAL <= where) & (where <= high + EQUAL), axis=-1)
+
+    for share in SHARPER:
+        ticks = np.rint(clock.places(0.5 * (low + high)))
+        if not low.size or (not clock.between and held(np.zeros(1), np.zeros(1))[0] == low.size):
+            return clock
+        later = share * clock.interval * np.linspace(-1.0, 1.0, ACROSS)
+        fit = held(later[:, None], later[None, :])
+        begin, last = (later[places].mean() for places in np.nonzero(fit == fit.max()))
+        lasts = max(clock.interval, float(ticks[-1]) * clock.interval)
+        clock = clock._replace(begin=clock.begin + float(begin), fast=clock.fast + float(last) / lasts)
+    return clock
 
 
 def agreeing(rows: Sequence[tuple[float, float, float]], interval: float) -> Array | None:
@@ -306,9 +346,10 @@ def in_common(low: Array, high: Array, interval: float) -> tuple[float, float, f
     turned = np.sum(narrow * np.exp(2j * np.pi * middle / interval))
     about = float(np.angle(turned)) / (2.0 * np.pi) * interval
     off = (middle - about + 0.5 * interval) % interval - 0.5 * interval
-    if np.mean(np.abs(off) > (0.5 - ROUNDED) * interval) > MISSED:
-        return float(np.mean(middle)), math.inf, -math.inf
     half = 0.5 * (high - low)
+    across = np.abs(off[half < TELLING * interval]) > (0.5 - ROUNDED) * interval
+    if across.size and np.mean(across) > MISSED:
+        return float(np.mean(middle)), math.inf, -math.inf
     least, most = np.quantile(off - half, 1.0 - MISSED), np.quantile(off + half, MISSED)
     return float(np.mean(middle)), about + float(least), about + float(most)
 
