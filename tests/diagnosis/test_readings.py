@@ -102,6 +102,24 @@ def test_rounding_shared_by_all_readings_of_a_unit_is_attributed_to_the_logger(c
     assert found_in(cases.record({**effects, **more}, duration=8.0)) == []
 
 
+def test_a_step_like_those_stated_of_other_channels_is_that_of_the_converter(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    measured = {lab.role: [name for name in lab.measured if whole.has(name)] for lab in whole.labs}
+    steps = {name: float(np.ptp(whole.signals[name])) / 4096 for names in measured.values() for name in names}
+    own = {"table_acceleration": 3.0 * steps.pop("table_acceleration")}
+    channels = {
+        role: {name: ImportedChannel(resolution=steps[name]) for name in names if name in steps}
+        for role, names in measured.items()
+    }
+    metadata = ImportedData("log.csv", channels=channels).metadata()
+    logged = replace(whole, run=replace(whole.run, metadata=whole.run.metadata | {IMPORT: metadata}))
+    white = dict.fromkeys(steps.keys() | own.keys(), 1e-9)
+    assert [item.effect for item in readings.findings(whole, white, own, own, logged=True)] == [
+        "sensor.table_acceleration.quantization"
+    ]
+    assert readings.findings(logged, white, own, own, logged=True) == []
+
+
 def test_noise_of_a_converter_is_attributed_to_the_logger(cases: Cases) -> None:
     whole = cases.record(duration=8.0)
     levels = readings.levels([residuals.prepare(kind(whole), whole) for kind in (lab_a, lab_b)])

@@ -174,7 +174,7 @@ def beside_rounding(white: float, step: float) -> float:
     return math.sqrt(white**2 - step**2 / 12.0) if STEPPING * white > step else 0.0
 
 
-def coarsest(record: Record, rounded: dict[str, float]) -> dict[str, float]:
+def coarsest(record: Record, rounded: Mapping[str, float]) -> dict[str, float]:
     """Largest step that the logger's own rounding explains, by signal; empty unless most readings are rounded.
 
     A converter or a text rounds all channels to about as many digits, or all of a unit to one decimal, while a sensor
@@ -219,7 +219,9 @@ def findings(
     }
     usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, LEAST_SCALE)
     result = []
-    coarse = coarsest(record, rounded) | stated_steps(record)
+    stated = stated_steps(record)
+    whole = {name: max(stated.get(name, 0.0), rounded.get(name, 0.0)) for name in (*stated, *rounded)}
+    coarse = coarsest(record, whole) | stated
     for name, step in rounded.items():
         expected = noise_of.get(name, 0.0) * usual
         seen = FINE_ERROR * float(np.std(record.signals[name])) * math.sqrt(12.0)

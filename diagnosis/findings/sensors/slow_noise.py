@@ -29,8 +29,9 @@ def under_less_noise(search: Search) -> tuple[Search, str]:
     """A search whose effects, if any, are held against less noise where coloured noise may hide an unknown effect.
 
     That is white noise where several readings have the noise as they would follow from one motion: it is that motion.
-    Where commands that no row showed make such a motion, it says nothing. For a lone reading it is the noise that all readings have; with it goes the reading of which that is doubtful, empty
-    where there is none or where the effects explain it as well.
+    Where commands that no row showed make such a motion, it says nothing. For a lone reading it is the noise that all
+    readings have; with it goes the reading of which that is doubtful, empty where there is none or where the effects
+    explain it as well.
     """
     if not sensor_noise.coloured(search.chosen.data):
         return search, ""

@@ -33,9 +33,14 @@ TOWARDS = 0.1  # of an interval
 # Of an interval, half the width of bounds below which they say on which side of a tick another one is: a row of hardly
 # less than an interval has its tick anywhere.
 TELLING = 0.4
-HARDLY = 0.15  # of an interval, by which rows are closer than ticks that share one too seldom to bound it well
+HARDLY = (
+    0.15  # of an interval, by which rows are closer than ticks that share one too seldom to bound it well
+)
 EQUAL = 1e-9  # s, below which two times are one
-SHARPER, ACROSS = (1e-1, 2e-2, 4e-3), 31  # of an interval, closer and closer, and beginnings and rates within it
+SHARPER, ACROSS = (
+    (1e-1, 2e-2, 4e-3),
+    31,
+)  # of an interval, closer and closer, and beginnings and rates within it
 STEADY = 0.2  # share of the usual width of bounds that all of them have in common, of a clock that is in step
 FASTEST, STEP = 1e-3, 5e-7  # of clocks: what any errs by at most, and between rates that are tried
 OTHER = 0.01  # share of neighbours within one interval that may differ in a channel that holds
@@ -83,7 +88,7 @@ class ControllerClock(NamedTuple):
     def holds(self, times: Array, values: Array) -> bool:
         """Whether values (n,) at times (n,) of the logger, s, change from tick to tick and not between."""
         place = self.places(times)
-        # rows of hardly more than one in an interval share a tick where one is just behind it and one just before the next
+        # rows hardly closer than ticks share one where the first is just behind it and the other just before the next
         slack = SHARP if hardly_faster(place, 1.0) else ROUNDED
         between = np.abs(place - np.round(place)) > slack
         together = np.floor(place[1:] + slack) == np.floor(place[:-1] + slack)
@@ -285,7 +290,7 @@ def sharpened(clock: ControllerClock, low: Array, high: Array) -> ControllerCloc
         """How many bounds are held by clocks that begin later by some s, and are later by others at the last bound."""
         ends = clock.begin + begin[..., None] + last[..., None] * (ticks / max(1.0, ticks[-1]))
         where = ends + (1.0 + clock.fast) * clock.interval * ticks
-        return np.count_nonzero((low - EQUAL <= where) & (where <= high + EQUAL), axis=-1)
+        return np.asarray(np.sum((low - EQUAL <= where) & (where <= high + EQUAL), axis=-1, dtype=np.float64))
 
     for share in SHARPER:
         ticks = np.rint(clock.places(0.5 * (low + high)))
