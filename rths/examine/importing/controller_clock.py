@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from diagnosis.signals.clock import QUARTZ
 from models.registry import Array
+from rths.examine.importing.sharper import hardly_faster, sharpened
 
 LEAST_RUNS = 40  # of rows of one value, from which on they may be those of a controller
 CHANGING = 0.5  # share of the ticks at which such a channel changes at least
@@ -33,14 +34,6 @@ TOWARDS = 0.1  # of an interval
 # Of an interval, half the width of bounds below which they say on which side of a tick another one is: a row of hardly
 # less than an interval has its tick anywhere.
 TELLING = 0.4
-HARDLY = (
-    0.15  # of an interval, by which rows are closer than ticks that share one too seldom to bound it well
-)
-EQUAL = 1e-9  # s, below which two times are one
-SHARPER, ACROSS = (
-    (1e-1, 2e-2, 4e-3),
-    31,
-)  # of an interval, closer and closer, and beginnings and rates within it
 STEADY = 0.2  # share of the usual width of bounds that all of them have in common, of a clock that is in step
 FASTEST, STEP = 1e-3, 5e-7  # of clocks: what any errs by at most, and between rates that are tried
 OTHER = 0.01  # share of neighbours within one interval that may differ in a channel that holds
@@ -273,35 +266,6 @@ def clock_by_changes(
     near = high - low < 2.0 * TELLING * interval
     hardly = hardly_faster(times, interval)
     return sharpened(found, low[near], high[near]) if found and hardly else found
-
-
-def hardly_faster(times: Array, interval: float) -> bool:
-    """Whether there is hardly more than one row in an interval, at times (n,) in its unit."""
-    return float(np.median(np.diff(times))) > (1.0 - HARDLY) * interval
-
-
-def sharpened(clock: ControllerClock, low: Array, high: Array) -> ControllerClock:
-    """The clock, known roughly, within most of the bounds (runs,) of its ticks, s: in the middle of such clocks.
-
-    One that is in step stays so where it is within all of them.
-    """
-
-    def held(begin: Array, last: Array) -> Array:
-        """How many bounds are held by clocks that begin later by some s, and are later by others at the last bound."""
-        ends = clock.begin + begin[..., None] + last[..., None] * (ticks / max(1.0, ticks[-1]))
-        where = ends + (1.0 + clock.fast) * clock.interval * ticks
-        return np.asarray(np.sum((low - EQUAL <= where) & (where <= high + EQUAL), axis=-1, dtype=np.float64))
-
-    for share in SHARPER:
-        ticks = np.rint(clock.places(0.5 * (low + high)))
-        if not low.size or (not clock.between and held(np.zeros(1), np.zeros(1))[0] == low.size):
-            return clock
-        later = share * clock.interval * np.linspace(-1.0, 1.0, ACROSS)
-        fit = held(later[:, None], later[None, :])
-        begin, last = (later[places].mean() for places in np.nonzero(fit == fit.max()))
-        lasts = max(clock.interval, float(ticks[-1]) * clock.interval)
-        clock = clock._replace(begin=clock.begin + float(begin), fast=clock.fast + float(last) / lasts)
-    return clock
 
 
 def agreeing(rows: Sequence[tuple[float, float, float]], interval: float) -> Array | None:

@@ -19,6 +19,7 @@ from common.roles import MASTER
 from common.signals import FieldType, Signal
 from models.registry import Array
 from report.text.tabular import DataTable
+from rths.examine.importing.clock_by_smoothness import clock_by_smoothness
 from rths.examine.importing.controller_clock import ControllerClock, clock_by_ground, clock_by_rows, clock_of
 from rths.examine.importing.import_map import ImportMap, SignalSource, in_unit, lab_signals
 from rths.examine.importing.time_base import (
@@ -184,7 +185,9 @@ def clock_in(
         found = clock_by_ground(theirs, ground, planned, interval, channels)
         if found is not None:
             return found, planned
-    return clock_of(theirs, channels, interval), None
+    if (found := clock_of(theirs, channels, interval)) is not None:
+        return found, None
+    return clock_by_smoothness(theirs, columns_of_controller(mapping, table, data, rows), interval), None
 
 
 def recorded_ground(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> Array | None:
@@ -240,6 +243,17 @@ def columns_of(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> l
     """The columns (rows,) of the data that are signals and have a number in every row."""
     columns = [
         pick(table, source.column, data)[rows] for source in mapping.signals.values() if source.value is None
+    ]
+    return [one for one in columns if np.isfinite(one).all()]
+
+
+def columns_of_controller(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> list[Array]:
+    """The columns (rows,) of the data that a controller computed, as numbers, and that have one in every row."""
+    computed = of_controller(mapping.plan)
+    columns = [
+        pick(table, source.column, data)[rows]
+        for name, source in mapping.signals.items()
+        if name in computed and source.value is None and source.filter is None and not source.late
     ]
     return [one for one in columns if np.isfinite(one).all()]
 

@@ -1,0 +1,52 @@
+"""A controller's clock that is known roughly, sharpened by the ticks that two rows of a logger share.
+
+Rows that are hardly closer than ticks bound a tick seldom, where two of them share one, and then to a few hundredths of
+an interval.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.registry import Array
+
+if TYPE_CHECKING:
+    from rths.examine.importing.controller_clock import ControllerClock
+
+HARDLY = (
+    0.15  # of an interval, by which rows are closer than ticks that share one too seldom to bound it well
+)
+EQUAL = 1e-9  # s, below which two times are one
+# Of an interval, by which clocks begin elsewhere, and are elsewhere at the end, closer and closer; how many of each.
+SHARPER, ACROSS = (1e-1, 2e-2, 4e-3), 31
+
+
+def hardly_faster(times: Array, interval: float) -> bool:
+    """Whether there is hardly more than one row in an interval, at times (n,) in its unit."""
+    return float(np.median(np.diff(times))) > (1.0 - HARDLY) * interval
+
+
+def sharpened(clock: ControllerClock, low: Array, high: Array) -> ControllerClock:
+    """The clock, known roughly, within most of the bounds (runs,) of its ticks, s: in the middle of such clocks.
+
+    One that is in step stays so where it is within all of them.
+    """
+
+    def held(begin: Array, last: Array) -> Array:
+        """How many bounds are held by clocks that begin later by some s, and are later by others at the last bound."""
+        ends = clock.begin + begin[..., None] + last[..., None] * (ticks / max(1.0, ticks[-1]))
+        where = ends + (1.0 + clock.fast) * clock.interval * ticks
+        return np.asarray(np.sum((low - EQUAL <= where) & (where <= high + EQUAL), axis=-1, dtype=np.float64))
+
+    for share in SHARPER:
+        ticks = np.rint(clock.places(0.5 * (low + high)))
+        if not low.size or (not clock.between and held(np.zeros(1), np.zeros(1))[0] == low.size):
+            return clock
+        later = share * clock.interval * np.linspace(-1.0, 1.0, ACROSS)
+        fit = held(later[:, None], later[None, :])
+        begin, last = (later[places].mean() for places in np.nonzero(fit == fit.max()))
+        lasts = max(clock.interval, float(ticks[-1]) * clock.interval)
+        clock = clock._replace(begin=clock.begin + float(begin), fast=clock.fast + float(last) / lasts)
+    return clock

@@ -1,0 +1,50 @@
+"""The ticks of a controller by the clock of a slower logger, from how smooth its own numbers are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from models.registry import Array
+from rths.examine.importing.clock_by_smoothness import clock_by_smoothness
+
+INTERVAL = 2e-3
+
+
+def moved(t: Array) -> Array:
+    """A motion (n,) at times (n,), s, with content up to 9 Hz."""
+    return sum((np.sin(2.0 * np.pi * f * t + f) / f for f in (0.7, 2.3, 4.1, 9.0)), np.zeros_like(t))
+
+
+def logged(rate: float, begin: float, ppm: float, seconds: float) -> tuple[Array, Array]:
+    """Times by the logger, s, of rows that begin some time after a tick, and the ticks of which they show numbers."""
+    times = np.arange(round(seconds * rate)) / rate
+    return times, np.floor((begin + times / (1.0 + 1e-6 * ppm)) / INTERVAL + 1e-9)
+
+
+@pytest.mark.parametrize("rate", [120.0, 200.0, 256.0, 333.0])
+@pytest.mark.parametrize(("begin", "ppm", "seconds"), [(0.3e-3, -35.0, 30.0), (1.6e-3, 60.0, 90.0)])
+def test_the_smoothest_motion_is_at_its_own_ticks(
+    rate: float, begin: float, ppm: float, seconds: float
+) -> None:
+    times, ticks = logged(rate, begin, ppm, seconds)
+    motion = moved(INTERVAL * ticks)
+    found = clock_by_smoothness(times, [0.0 * times, np.round(motion, 6)], INTERVAL)
+    assert found is not None
+    seen, values = found.seen(times, ticks)
+    apart = values - np.rint(seen / INTERVAL)
+    assert np.ptp(apart) == 0.0  # it cannot know which tick is the first one
+    assert abs(apart[0]) <= 1.0
+
+
+def test_rows_that_keep_to_the_ticks_and_noise_tell_nothing() -> None:
+    times, ticks = logged(250.0, 0.3e-3, 0.0, 30.0)
+    motion = moved(INTERVAL * ticks)
+    assert clock_by_smoothness(times, [motion], INTERVAL) is None
+    times, ticks = logged(256.0, 0.3e-3, 20.0, 30.0)
+    noise = np.random.default_rng(3).normal(size=times.size)
+    assert clock_by_smoothness(times, [noise], INTERVAL) is None
+    assert clock_by_smoothness(times, [moved(times)], INTERVAL) is None  # a reading, taken at its row
+    assert clock_by_smoothness(times[:150], [moved(INTERVAL * ticks[:150])], INTERVAL) is None
+    fast, ticks = logged(1024.0, 0.3e-3, 20.0, 30.0)
+    assert clock_by_smoothness(fast, [moved(INTERVAL * ticks)], INTERVAL) is None  # repeats tell more
