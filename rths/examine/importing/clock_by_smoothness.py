@@ -6,6 +6,7 @@ motion is as smooth as it was; put at others it jumps back and forth by what it 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -17,17 +18,22 @@ from rths.examine.importing.controller_clock import ControllerClock
 SLOWER = 0.97  # rows in an interval, below which they pass over ticks
 FASTEST = 1e-4  # by which clocks differ at most
 BEGUN = 20.0  # s, of the beginning by which a clock is found roughly
-# Of an interval, by which clocks are tried that begin, and are later at the end, closer and closer.
-STEPS = (0.1, 0.03, 0.01, 0.003)
-REACH = 5  # such steps to each side
-SURELY = 0.2  # of what the worst clock leaves, below which one is found
+MOST_DOUBLED = 16  # times that this beginning is made twice as long
+# Of an interval, by which clocks are tried that begin elsewhere or are elsewhere at the end, closer and closer, and how
+# many such steps to each side.
+FINER, REACH = (0.1, 0.03, 0.01, 0.003), 6
+ALIKE = 1.01  # of what the best clock leaves, up to which another one is as good
+# Of an interval, within which clocks put most rows at the same ticks, and rounds in which the middle of these is found.
+NEAR, ROUNDS = 0.5, 5
+SURELY = 0.05  # of what the worst clock of its rate leaves, below which one is found
 FEWEST = 200  # rows
-NEAR = 0.3  # of an interval, within which clocks put most rows at the same ticks
-TYPICAL = 1.6  # of the usual distance of four neighbours, up to which these tell what is between them
+SIDE = 3  # neighbours to each side of a row
+NEIGHBOURS = [by for by in range(-SIDE, SIDE + 1) if by]
+TYPICAL = 1.6  # of the usual distance of these, up to which they tell what is between them
 
 
 class Fitted(NamedTuple):
-    """A clock with what it leaves of a motion over what the worst one leaves."""
+    """A clock with what it leaves of a motion over what the worst one of its rate leaves."""
 
     clock: ControllerClock
     share: float
@@ -43,53 +49,54 @@ def clock_by_smoothness(times: Array, channels: Iterable[Array], interval: float
 
 
 def best(times: Array, values: Array, interval: float) -> Fitted:
-    """The clock by which a motion (n,) is smoothest."""
-    lasts = min(BEGUN, float(times[-1]))
-    begins, rates = STEPS[0] * np.arange(-REACH, REACH + 1.0), STEPS[0] * interval / lasts
-    fasts = rates * np.arange(-np.ceil(FASTEST / rates), np.ceil(FASTEST / rates) + 1.0)
-    clock, most, least = ControllerClock(interval, 0.0, 0.0), 0.0, np.inf
-    for step in STEPS:
+    """The clock by which a motion (n,) is smoothest: by its beginning first, by more and more, and then closer."""
+    whole = float(times[-1])
+    lengths = [BEGUN * 2.0**power for power in range(MOST_DOUBLED) if BEGUN * 2.0**power < whole]
+    looks = [*((lasts, FINER[0]) for lasts in lengths), *((whole, step) for step in FINER)]
+    clock, most, least = ControllerClock(interval, 0.0, 0.0), 0.0, 0.0
+    for lasts, step in looks:
         there = times <= lasts
+        late = REACH if most else int(np.ceil(FASTEST * lasts / (step * interval)))
         clocks = [
-            ControllerClock(interval, clock.begin + interval * begin, clock.fast + fast)
-            for begin in begins
-            for fast in fasts
+            ControllerClock(interval, clock.begin + interval * begin, clock.fast + interval * end / lasts)
+            for begin, end in itertools.product(around(REACH, step), around(late, step))
         ]
-        left = np.array([missed(one, times[there], values[there]) for one in clocks])
-        most, least = most or float(left.max()), float(left.min())
-        clock = middle([one for one, over in zip(clocks, left, strict=True) if over <= 1.001 * least], lasts)
-        lasts = float(times[-1])
-        begins = step * np.linspace(-1.0, 1.0, 2 * REACH + 1)
-        fasts = begins * interval / lasts
+        left = [missed(one, times[there], values[there]) for one in clocks]
+        least = min(left)
+        same = clocks[left.index(least)].fast
+        most = most or max(over for one, over in zip(clocks, left, strict=True) if one.fast == same)
+        near = [one for one, over in zip(clocks, left, strict=True) if over <= ALIKE * least]
+        clock = middle(near, lasts)
     return Fitted(clock, least / max(most, 1e-300))
 
 
-def middle(alike: Sequence[ControllerClock], lasts: float) -> ControllerClock:
-    """The middle of clocks that leave as little over some s, of those near the first one from the first row on.
+def around(steps: int, step: float) -> list[float]:
+    """Parts of an interval to either side of none."""
+    return [step * place for place in range(-steps, steps + 1)]
 
-    Others put every row at the next tick, which is as smooth.
-    """
-    first = min(alike, key=lambda one: abs(one.begin) + lasts * abs(one.fast))
-    near = [
-        one
-        for one in alike
-        if max(abs(one.begin - first.begin), lasts * abs(one.fast - first.fast)) <= NEAR * first.interval
-    ]
-    begin, fast = (float(np.mean([one[place] for one in near])) for place in (1, 2))
-    return ControllerClock(first.interval, begin, fast)
+
+def middle(alike: Sequence[ControllerClock], lasts: float) -> ControllerClock:
+    """The middle of clocks that leave as little over some s, those aside that put every row at another tick."""
+    interval = alike[0].interval
+    where = np.array([(one.begin, lasts * one.fast) for one in alike]) / interval
+    centre = where[np.argmin(np.abs(where).sum(axis=1))]
+    for _ in range(ROUNDS):
+        centre = where[np.abs(where - centre).max(axis=1) <= NEAR].mean(axis=0)
+    return ControllerClock(interval, float(centre[0]) * interval, float(centre[1]) * interval / lasts)
 
 
 def missed(clock: ControllerClock, times: Array, values: Array) -> float:
-    """Mean of what cubics through four neighbours miss a motion (n,) by, at the ticks that a clock gives its rows."""
+    """Mean of what polynomials through neighbours miss a motion (n,) by, at the ticks that a clock gives its rows."""
     ticks = np.floor(clock.places(times))
-    apart = [ticks[2 + by : ticks.size - 2 + by] - ticks[2:-2] for by in (-2, -1, 1, 2)]
-    known = np.zeros(ticks.size - 4)
-    for own, by in zip(apart, (-2, -1, 1, 2), strict=True):
+    inner = slice(SIDE, ticks.size - SIDE)
+    apart = {by: ticks[SIDE + by : ticks.size - SIDE + by] - ticks[inner] for by in NEIGHBOURS}
+    known = np.zeros(ticks.size - 2 * SIDE)
+    for by, own in apart.items():
         weight = np.ones_like(known)
-        for other in apart:
+        for other in apart.values():
             if other is not own:
                 weight *= other / np.where(other == own, np.inf, other - own)
-        known += weight * values[2 + by : ticks.size - 2 + by]
-    spread = apart[3] - apart[0]
+        known += weight * values[SIDE + by : ticks.size - SIDE + by]
+    spread = apart[SIDE] - apart[-SIDE]
     usual = spread < TYPICAL * np.median(spread)
-    return float(np.mean(np.abs(values[2:-2] - known)[usual]))
+    return float(np.mean(np.abs(values[inner] - known)[usual]))
