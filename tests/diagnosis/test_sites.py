@@ -259,6 +259,18 @@ def test_an_effect_of_a_specimen_is_not_misplaced_where_the_gap_is_a_function_of
     assert misplaced(Search(data, bare, fitting.at(data, values, bare.z), ())) is wrong
 
 
+def test_a_force_that_follows_from_the_motion_that_was_read_is_none_of_the_specimen_s(cases: Cases) -> None:
+    part, data, nominal = predicted(cases, lab_a)
+    both = ("column", "sensor.column_force")
+    noise = data.white * white(7, *nominal.shape)
+    part.measured = commanded(part, 0, ripple).predict(data.system) + noise
+    assert likely.follows_motion(part, data.system) == both
+    for column in (0, 1):  # an error of the motion's sensor, or of the force alone
+        part.measured = nominal + noise
+        part.measured[:, column] = softer(part.measured[:, column])
+        assert likely.follows_motion(part, data.system) == ()
+
+
 def test_a_building_has_no_likely_sites(cases: Cases) -> None:
     whole = cases.record(duration=SECONDS)
     data = residuals.prepare(Building(whole), whole)

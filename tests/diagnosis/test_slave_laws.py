@@ -17,6 +17,7 @@ from laboratories.table.kind import TABLE
 from loop import replay
 from models.registry import Array
 from models.system import System
+from tests.diagnosis.cases import Cases, named
 from tests.diagnosis.specimens import (
     INTERVAL,
 )
@@ -126,3 +127,13 @@ def test_play_behind_the_tables_loop_is_told_from_play_before_it() -> None:
     assert CATALOGUE["table.backlash"].laws[int(values["law"])].name == "behind the loop"
     np.testing.assert_allclose(values["width"], part.WIDTH, rtol=0.05)
     assert fitting.excess(found) < 0.2 * fitting.excess(before)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("law", [0.0, 1.0])
+def test_a_constant_force_needs_no_bias_of_its_reading(cases: Cases, law: float) -> None:
+    report = cases.report({"damper.offset": {"force": 2.0, "law": law}})
+    assert named(report) == ["damper.offset"]
+    found = report["which"][0]["parameters"]["damper.offset"]
+    assert found["force"]["value"] == pytest.approx(2.0, rel=0.02)
+    assert ("law" in found and found["law"]["value"] == 1.0) == (law == 1.0)
