@@ -17,9 +17,10 @@ from common.plan.plan import Plan
 from common.recording.imported import at_rest
 from diagnosis.recorded.commands import followed
 from diagnosis.recorded.laboratory import RecordedLaboratory
+from diagnosis.recorded.logger.beside_commands import beside_commands
 from diagnosis.recorded.logger.finer import Finer
 from diagnosis.recorded.logger.through import through_logger
-from diagnosis.recorded.logger.unseen import between_shown, shown
+from diagnosis.recorded.logger.unseen import unseen
 from diagnosis.recorded.nuisances import (
     BETWEEN,
     CALIBRATED,
@@ -34,6 +35,7 @@ from diagnosis.recorded.nuisances import (
     of_logger,
 )
 from diagnosis.recorded.record import Late, Record
+from diagnosis.recorded.smoothed import smoothed
 from diagnosis.signals import pieces
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
@@ -53,6 +55,7 @@ PIECE, REACH = 0.25, 10
 # Rows in an interval from which on they are not the controller's own, but of a converter that may take its channels in
 # turn, some ten µs apart.
 OWN_RATE = 1.03
+HALF = 0.5  # of an interval, by which an output that holds its value is late on average
 BENT = 8  # times as many steps, in which a command that bends is all but straight
 # Systems of which a part keeps what they did: as many as the slopes of a fit take, and no more numbers than these.
 PLAYED, NUMBERS = 8, 4_000_000
@@ -169,7 +172,8 @@ class LaboratoryPart:
         machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]
         seen = [machine for machine in machines if self.shows(record, machine)]
         names = tuple(name for machine in seen for name in machine.parameters)
-        self.channels = channels(record.stated, lab)
+        self.logged_by = channels(record.stated, lab)
+        self.channels = self.logged_by
         kept = at_rest(record.run)
         self.rest = tuple(kept.get((lab.role, channel)) for channel in lab.kind.channels.names)
         interval = record.plan.test.interval
@@ -183,6 +187,11 @@ class LaboratoryPart:
         held = lab.kind.name == COLUMN and lab.plan.actuator.command == "held"
         self.steps = 0 if held else record.steps if self.built_in else min(record.steps, 1)
         self.interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
+        if record.stated is not None:
+            sent = [record.stated.channel(lab.role, name) for name in self.devices if record.has(name)]
+            self.channels = beside_commands(self.logged_by, sent, 0.0 if self.steps else HALF * self.interval)
+            if self.channels != self.logged_by:  # what the logger added to commands moved nothing
+                self.inputs = {name: smoothed(values) for name, values in self.inputs.items()}
         self.early = 0.0 if self.steps or record.numbered else self.interval
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)
@@ -199,24 +208,7 @@ class LaboratoryPart:
             self.freed = self.signals.index(lab.signal(lab.kind.free))
         if self.anew is not None and not lab.kind.drifts(lab.plan) and self.rested(record.systems[lab.role]):
             self.anew = None
-        self.blurred = self.unseen(record)
-
-    def unseen(self, record: Record) -> Array | float:
-        """Rms (signals,) of what commands may have moved of which a logger with slow rows showed every few ticks.
-
-        It is that of the plan's laboratory under a draw of the noise that such rows show.
-        """
-        target, seed = self.lab.signal(self.lab.kind.channels.target.name), record.plan.test.seed
-        more = dict(self.inputs)
-        for place, (name, values) in enumerate(self.inputs.items()):
-            ticks = shown(record, self.role, name if record.has(name) else target)
-            if ticks is not None:
-                more[name] = values + between_shown(values, ticks, seed + place)
-        if all(more[name] is values for name, values in self.inputs.items()):
-            return 0.0
-        plan = System(self.lab.plan)
-        moved = self.replaced(inputs=more).predict(plan) - self.predict(plan)
-        return np.asarray(np.sqrt(np.mean(np.square(moved), axis=0)))
+        self.blurred = unseen(self, record)
 
     def targets(self, record: Record) -> dict[str, Array]:
         """What moves the laboratory, by command, without the noise of its sensors that a controller feeds back.
@@ -266,7 +258,7 @@ class LaboratoryPart:
     @property
     def passes(self) -> Array:
         """Frequencies (signals,) up to which the channels are stated to pass noise, Hz."""
-        return np.array([channel.passes for channel in self.channels])
+        return np.array([channel.passes for channel in self.logged_by])
 
     @property
     def level(self) -> Array:

@@ -56,8 +56,8 @@ def test_what_was_shown_is_known_and_what_was_not_is_as_noisy() -> None:
 
 def test_a_part_knows_what_commands_move_that_no_row_showed(cases: Cases) -> None:
     whole = cases.record()
-    found, missed = shaken(whole, 2e-6)
-    assert lab_a(found).blurred == pytest.approx(np.sqrt(np.mean(np.square(missed), axis=0)), rel=0.3)
+    found, missed = shaken(whole, 2e-5)  # far more than what the controller feeds back of its readings
+    assert lab_a(found).blurred == pytest.approx(np.sqrt(np.mean(np.square(missed), axis=0)), rel=0.25)
     assert lab_a(whole).blurred == 0.0
 
 
@@ -72,5 +72,5 @@ def test_a_motion_that_no_row_showed_the_command_of_is_no_effect(
         return judge(search(residuals.prepare(part, found), Scales(found))).outcome
 
     assert outcome() in ("none", "tolerances")
-    monkeypatch.setattr("diagnosis.recorded.parts.between_shown", lambda values, *_: 0.0 * values)
+    monkeypatch.setattr("diagnosis.recorded.logger.unseen.between_shown", lambda values, *_: 0.0 * values)
     assert outcome() == "unknown"

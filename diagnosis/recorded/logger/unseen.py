@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -9,6 +11,10 @@ from scipy.interpolate import CubicSpline
 from common.recording.imported import ImportedData
 from diagnosis.recorded.record import Record
 from models.registry import Array
+from models.system import System
+
+if TYPE_CHECKING:
+    from diagnosis.recorded.parts import LaboratoryPart
 
 # Rows in an interval, below which they pass over ticks that count. Of faster rows near the ticks the times hardly tell
 # which ticks they showed, and nearly all were.
@@ -23,6 +29,24 @@ def shown(record: Record, topic: str, name: str) -> NDArray[np.int64] | None:
     channel = (record.stated or ImportedData("")).channel(topic, name)
     slow = channel.interpolated and 0.0 < channel.rate * interval < SLOWER
     return channel.seen(record.ticks, interval) if slow else None
+
+
+def unseen(part: LaboratoryPart, record: Record) -> Array | float:
+    """Rms (signals,) of what commands may have moved of which a logger with slow rows showed every few ticks.
+
+    It is that of the plan's laboratory under a draw of the noise that such rows show; 0 where all ticks were shown.
+    """
+    target, seed = part.lab.signal(part.lab.kind.channels.target.name), record.plan.test.seed
+    more = dict(part.inputs)
+    for place, (name, values) in enumerate(part.inputs.items()):
+        ticks = shown(record, part.role, name if record.has(name) else target)
+        if ticks is not None:
+            more[name] = values + between_shown(values, ticks, seed + place)
+    if all(more[name] is values for name, values in part.inputs.items()):
+        return 0.0
+    plan = System(part.lab.plan)
+    moved = part.replaced(inputs=more).predict(plan) - part.predict(plan)
+    return np.asarray(np.sqrt(np.mean(np.square(moved), axis=0)))
 
 
 def between_shown(command: Array, ticks: NDArray[np.int64], seed: int) -> Array:
