@@ -22,8 +22,10 @@ MEAN = ImportedChannel(average=4e-3)
 
 def test_a_filter_of_both_is_as_none_and_one_of_the_command_makes_readings_early() -> None:
     same, early = beside_commands([replace(BESSEL, delay=3e-3), MEAN], [BESSEL.chain], 1e-3)
-    assert same == ImportedChannel(resolution=0.1, calibration=0.01, delay=pytest.approx(0.0, abs=1e-12))
-    assert early == replace(MEAN, delay=pytest.approx(-BESSEL.late - 1e-3))
+    assert replace(same, delay=0.0) == ImportedChannel(resolution=0.1, calibration=0.01)
+    assert same.delay == pytest.approx(0.0, abs=1e-12)
+    assert replace(early, delay=0.0) == MEAN
+    assert early.delay == pytest.approx(-BESSEL.late - 1e-3)
     assert beside_commands([BESSEL], [NOTHING_STATED], 1e-3) == (BESSEL,)
     assert beside_commands([BESSEL], [BESSEL, MEAN], 1e-3) == (BESSEL,)
     assert beside_commands([BESSEL], [], 1e-3) == (BESSEL,)

@@ -8,12 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models.registry import Array
-from rths.examine.importing.controller_clock import (
-    ControllerClock,
-    clock_by_ground,
-    clock_by_rows,
-    clock_of,
-)
+from rths.examine.importing.controller_clock import clock_by_ground, clock_by_rows, clock_of
+from rths.examine.importing.ticks import ControllerClock
 
 INTERVAL, SECONDS = 2e-3, 12.0
 

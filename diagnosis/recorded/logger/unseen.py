@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from common.recording.imported import ImportedData
+from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.record import Record
 from models.registry import Array
 from models.system import System
-
-if TYPE_CHECKING:
-    from diagnosis.recorded.parts import LaboratoryPart
 
 # Rows in an interval, below which they pass over ticks that count. Of faster rows near the ticks the times hardly tell
 # which ticks they showed, and nearly all were.
 SLOWER = 0.9
 # Weights of a value and of the four around it in what a cubic through these misses it by.
 CUBIC = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
+
+
+class Driven(Protocol):
+    """A laboratory that recorded commands drive."""
+
+    lab: RecordedLaboratory
+    role: str
+    inputs: dict[str, Array]
+
+    def predict(self, system: System) -> Array:
+        """Readings of the laboratory, (ticks, signals)."""
+
+    def replaced(self, **fields: Any) -> Driven:
+        """The same laboratory in another test."""
 
 
 def shown(record: Record, topic: str, name: str) -> NDArray[np.int64] | None:
@@ -31,7 +43,7 @@ def shown(record: Record, topic: str, name: str) -> NDArray[np.int64] | None:
     return channel.seen(record.ticks, interval) if slow else None
 
 
-def unseen(part: LaboratoryPart, record: Record) -> Array | float:
+def unseen(part: Driven, record: Record) -> Array | float:
     """Rms (signals,) of what commands may have moved of which a logger with slow rows showed every few ticks.
 
     It is that of the plan's laboratory under a draw of the noise that such rows show; 0 where all ticks were shown.

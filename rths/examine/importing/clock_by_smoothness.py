@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.registry import Array
-from rths.examine.importing.controller_clock import ControllerClock
+from rths.examine.importing.ticks import ControllerClock
 
 SLOWER = 0.97  # rows in an interval, below which they pass over ticks
 FASTEST = 1e-4  # by which clocks differ at most

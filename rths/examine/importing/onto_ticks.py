@@ -20,8 +20,9 @@ from common.signals import FieldType, Signal
 from models.registry import Array
 from report.text.tabular import DataTable
 from rths.examine.importing.clock_by_smoothness import clock_by_smoothness
-from rths.examine.importing.controller_clock import ControllerClock, clock_by_ground, clock_by_rows, clock_of
+from rths.examine.importing.controller_clock import clock_by_ground, clock_by_rows, clock_of
 from rths.examine.importing.import_map import ImportMap, SignalSource, in_unit, lab_signals
+from rths.examine.importing.ticks import ControllerClock
 from rths.examine.importing.time_base import (
     EVENLY,
     FOR_A_SPLINE,

@@ -6,26 +6,14 @@ an interval.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from models.registry import Array
+from rths.examine.importing.ticks import ControllerClock
 
-if TYPE_CHECKING:
-    from rths.examine.importing.controller_clock import ControllerClock
-
-HARDLY = (
-    0.15  # of an interval, by which rows are closer than ticks that share one too seldom to bound it well
-)
 EQUAL = 1e-9  # s, below which two times are one
 # Of an interval, by which clocks begin elsewhere, and are elsewhere at the end, closer and closer; how many of each.
 SHARPER, ACROSS = (1e-1, 2e-2, 4e-3), 31
-
-
-def hardly_faster(times: Array, interval: float) -> bool:
-    """Whether there is hardly more than one row in an interval, at times (n,) in its unit."""
-    return float(np.median(np.diff(times))) > (1.0 - HARDLY) * interval
 
 
 def sharpened(clock: ControllerClock, low: Array, high: Array) -> ControllerClock:
