@@ -173,7 +173,7 @@ class LaboratoryPart:
         seen = [machine for machine in machines if self.shows(record, machine)]
         names = tuple(name for machine in seen for name in machine.parameters)
         self.logged_by = channels(record.stated, lab)
-        self.channels = self.logged_by
+        self.channels = self.logged_by  # further below, what readings passed that commands did not
         kept = at_rest(record.run)
         self.rest = tuple(kept.get((lab.role, channel)) for channel in lab.kind.channels.names)
         interval = record.plan.test.interval
@@ -190,7 +190,7 @@ class LaboratoryPart:
         if record.stated is not None:
             sent = [record.stated.channel(lab.role, name) for name in self.devices if record.has(name)]
             self.channels = beside_commands(self.logged_by, sent, 0.0 if self.steps else HALF * self.interval)
-            if self.channels != self.logged_by:  # what the logger added to commands moved nothing
+            if any(one.blunt for one in sent):  # what such a channel added to a command moved nothing
                 self.inputs = {name: smoothed(values) for name, values in self.inputs.items()}
         self.early = 0.0 if self.steps or record.numbered else self.interval
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))

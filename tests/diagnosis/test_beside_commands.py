@@ -27,6 +27,10 @@ def test_a_filter_of_both_is_as_none_and_one_of_the_command_makes_readings_early
     assert replace(early, delay=0.0) == MEAN
     assert early.delay == pytest.approx(-BESSEL.late - 1e-3)
     assert beside_commands([BESSEL], [NOTHING_STATED], 1e-3) == (BESSEL,)
+    late = ImportedChannel(delay=5e-3)
+    assert beside_commands([late], [late], 1e-3) == (
+        NOTHING_STATED,
+    )  # numbers, which no filter turned into a delay
     assert beside_commands([BESSEL], [BESSEL, MEAN], 1e-3) == (BESSEL,)
     assert beside_commands([BESSEL], [], 1e-3) == (BESSEL,)
 

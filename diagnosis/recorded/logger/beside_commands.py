@@ -15,13 +15,14 @@ def beside_commands(
 
     A filter of both is as none: a machine makes of a filtered command what the filter makes of its reading. One of the
     command alone makes readings early. `held` (s) is by how much an output that holds its value is later than the
-    command that it stands for. Commands that passed different filters leave the readings as they are.
+    command that it stands for, which a filter or mean turns into a delay. Commands that passed different filters leave
+    the readings as they are.
     """
     chains = {one.chain for one in commands}
     if len(chains) != 1 or chains == {NOTHING_STATED.chain}:
         return tuple(readings)
     (command,) = chains
-    return tuple(beside(one, command, held) for one in readings)
+    return tuple(beside(one, command, held if command.blunt else 0.0) for one in readings)
 
 
 def beside(reading: ImportedChannel, command: ImportedChannel, held: float) -> ImportedChannel:
