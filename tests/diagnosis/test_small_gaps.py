@@ -55,10 +55,9 @@ def test_a_gap_that_two_good_solutions_may_differ_by_is_seen(
 def test_so_small_a_gap_is_not_looked_for_behind_a_filter(cases: Cases) -> None:
     whole = cases.record({}, duration=8.0)
     part = lagging(whole, WIDTH)
-    filtered = ImportedChannel(LoggerFilter("butterworth", 4, 80.0))
-    data = replace(
-        residuals.prepare(part, whole), part=part.replaced(channels=(filtered,) * len(part.channels))
-    )
+    filtered = (ImportedChannel(LoggerFilter("butterworth", 4, 80.0)),) * len(part.channels)
+    behind = part.replaced(channels=filtered, logged_by=filtered)
+    data = replace(residuals.prepare(part, whole), part=behind)
     assert search(replace(data, part=part), Scales(whole)).data.erring == FINE_ERROR
     assert np.isfinite(data.part.passes).all()
     found = at_any_size(data, Scales(whole))
