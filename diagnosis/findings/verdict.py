@@ -182,7 +182,7 @@ def falls_short(search: Search) -> bool:
     fit = search.chosen
     strained = bool(pinned(fit)) or farthest(fit) < HALF or bool(at_end(fit))
     everywhere = fitting.at(replace(fit.data, vague=None), fit.values, fit.z)  # behind impacts as well
-    elsewhere = of_readings(search) and misplaced(search)
+    elsewhere = of_readings(search) and misplaced(search) and at_machine(search)
     return strained or leaves(everywhere, allowed(search)) or unproven(search) or small(search) or elsewhere
 
 
@@ -263,6 +263,11 @@ def misplaced(search: Search) -> bool:
     sensors_alone = not specimen and bool(by_form) and all(map(is_sensor, by_form))
     near = by_form if sensors_alone else {item.site for item in found if item.cost < APART}
     return bool(found) and not sites & near and found[0].left < 1.0 - search.explained
+
+
+def at_machine(search: Search) -> bool:
+    """Whether all readings together say that a gap arises at machines, and at no sensor."""
+    return not any(map(is_sensor, likely_sites(search.commissioned)))
 
 
 def allowed(search: Search) -> Array:
