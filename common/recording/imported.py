@@ -16,18 +16,18 @@ Values that the import map does not state are zero or None, which means that the
 
 from __future__ import annotations
 
-import cmath
 import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import InputError
+from common.recording.logger.low_pass import LoggerFilter, Samples
+from common.recording.logger.passing import averaged, later, past_high_pass
 from common.roles import MASTER, SLAVE, kind_of
 
 if TYPE_CHECKING:
@@ -35,64 +35,9 @@ if TYPE_CHECKING:
 
 IMPORT = "import"  # metadata of an imported recording
 REST = "at_rest"  # attachment of readings from before the test
-# The low-pass filters usual before the converters of data loggers, those with a ripple in what they pass last.
-FILTERS = ("butterworth", "bessel", "chebyshev", "elliptic")
-RIPPLING = FILTERS[2:]
 HALF_POWER = 0.443  # at which frequency a mean over time loses 3 dB, times that time
 ON_TICK = 1e-3  # of an interval, by which a row may come before the tick that it shows
 TINY = 1e-12  # Hz, in place of no frequency, at which a high-pass lets nothing pass
-NODES = (-2, -1, 0, 1)  # ticks of the samples around one, through which a cubic goes
-Samples = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class LoggerFilter:
-    """The analogue low-pass filter before a converter; what stands still passes it unchanged."""
-
-    type: str
-    order: int
-    cutoff: float  # Hz, at which 3 dB are lost, or at which the ripple of a filter ends
-    ripple: float = 0.0  # dB, of what a Chebyshev filter of type I or an elliptic one passes
-    attenuation: float = 0.0  # dB, at least, of what an elliptic one stops
-
-    @cached_property
-    def transfer(self) -> tuple[Samples, Samples]:
-        """Coefficients of numerator and denominator in s (rad/s), the highest power first."""
-        from scipy import signal
-
-        zeros, poles, gain = _design(self.type, self.order, self.ripple, self.attenuation)
-        scaled = gain * self.cutoff ** (poles.size - zeros.size)
-        above, below = signal.zpk2tf(self.cutoff * zeros, self.cutoff * poles, scaled)
-        return np.atleast_1d(above), np.asarray(below)
-
-    def response(self, frequency: Samples) -> NDArray[np.complex128]:
-        """Frequency response at `frequency` (Hz)."""
-        above, below = self.transfer
-        s = 2j * math.pi * np.asarray(frequency)
-        return np.asarray(np.polyval(above, s) / np.polyval(below, s), dtype=np.complex128)
-
-    @property
-    def modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-        """Poles p (1/s) with no negative imaginary part and weights w (1/s): the real part of Σ w/(s − p)."""
-        poles, weights, _ = _modes(self.type, self.order, self.ripple, self.attenuation)
-        return self.cutoff * poles, self.cutoff * weights
-
-    def filtered(self, values: Samples, interval: float) -> Samples:
-        """A signal (ticks,) after the filter, smooth between ticks and constant at its first value before them.
-
-        Straight lines between ticks would take the share (ω·interval)²/12 of a wave of frequency ω away, which shows in
-        a reading that moves 10,000 times its noise; a twelfth of the second differences gives that back.
-        Pole by pole, because the coefficients of a high order lose all digits where the cutoff is far below the rate.
-        """
-        from scipy import signal
-
-        moved = values - values[0]
-        moved[1:-1] -= np.diff(moved, 2) / 12.0
-        at_once = _modes(self.type, self.order, self.ripple, self.attenuation)[2]
-        result = np.asarray(values[0] + at_once * (values - values[0]), dtype=np.float64)
-        for pole, weight in zip(*self.modes, strict=True):
-            result += signal.lfilter(*_section(complex(pole) * interval, complex(weight) / pole), moved)
-        return result
 
 
 @dataclass(frozen=True)
@@ -285,55 +230,6 @@ def at_rest(run: Run) -> dict[tuple[str, str], Samples]:
     return dict(zip(names, values, strict=True))
 
 
-def past_high_pass(values: Samples, interval: float, corner: float) -> Samples:
-    """A signal (ticks,) after a high-pass of first order with a corner in Hz, linear between ticks.
-
-    The signal stood at its first value before, which the amplifier had forgotten.
-    """
-    from scipy import signal
-
-    step = 2.0 * math.pi * corner * interval
-    kept = math.exp(-step)
-    change = np.diff(values, prepend=values[0])
-    return np.asarray(signal.lfilter([-math.expm1(-step) / step], [1.0, -kept], change))
-
-
-def averaged(values: Samples, interval: float, length: float, means: int = 1) -> Samples:
-    """Means of a signal (ticks,) over the last `length` s, smooth between ticks and constant before the first one.
-
-    They are means of means, so many times. A twelfth of the second differences gives back what straight lines between
-    ticks would take away.
-    """
-    for _ in range(means - 1):
-        values = averaged(values, interval, length)
-    moved = values - values[0]
-    moved[1:-1] -= np.diff(moved, 2) / 12.0
-    whole = np.append(0.0, np.cumsum(0.5 * (moved[1:] + moved[:-1])))
-    begin = np.arange(values.size) - length / interval
-    tick = np.clip(np.floor(begin).astype(np.int64), 0, values.size - 2)
-    place = begin - tick
-    before = whole[tick] + place * moved[tick] + 0.5 * place**2 * (moved[tick + 1] - moved[tick])
-    return np.asarray(values[0] + (whole - np.where(begin > 0.0, before, 0.0)) * interval / length)
-
-
-def later(values: Samples, ticks: float) -> Samples:
-    """A signal (n,) that comes so many ticks later, on cubics through four samples; its ends stay constant.
-
-    It is for what a model predicts, which is smooth; of noise near half the rate of the ticks it takes a part away.
-    """
-    whole = math.floor(ticks)
-    part = ticks - whole
-    weights = [
-        math.prod((-part - other) / (node - other) for other in NODES if other != node) for node in NODES
-    ]
-    ahead, behind = max(whole, 0) + 2, max(-whole, 0) + 1
-    padded = np.concatenate([np.full(ahead, values[0]), values, np.full(behind, values[-1])])
-    first, result = ahead - whole, np.zeros(values.size)
-    for weight, node in zip(weights, NODES, strict=True):
-        result += weight * padded[first + node : first + node + values.size]
-    return result
-
-
 def logged_alone(run: Run) -> bool:
     """Whether a logger recorded a laboratory without the test around it, command and reading of a moment in one row.
 
@@ -350,53 +246,6 @@ def exchange_known(run: Run) -> bool:
     """Whether a recording tells which message was used when; without numbers or stamps the link cannot be judged."""
     names = {name for columns in run.columns.values() for name in columns}
     return any(name.endswith("_seq") or name.endswith("_one_way") for name in names)
-
-
-@cache
-def _design(
-    kind: str, order: int, ripple: float, attenuation: float
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128], float]:
-    """Zeros, poles and gain of a filter whose cutoff is 1 Hz, and whose gain at rest is one."""
-    from scipy import signal
-
-    shared: dict[str, Any] = {"Wn": 2.0 * math.pi, "analog": True, "output": "zpk"}
-    if kind == "bessel":
-        zeros, poles, gain = signal.bessel(order, norm="mag", **shared)
-    elif kind == "chebyshev":
-        zeros, poles, gain = signal.cheby1(order, ripple, **shared)
-    elif kind == "elliptic":
-        zeros, poles, gain = signal.ellip(order, ripple, attenuation, **shared)
-    else:
-        zeros, poles, gain = signal.butter(order, **shared)
-    at_rest = gain * np.prod(-zeros) / np.prod(-poles)
-    return zeros, poles, float(gain / at_rest.real)
-
-
-@cache
-def _modes(
-    kind: str, order: int, ripple: float, attenuation: float
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128], float]:
-    """Poles and weights of a filter whose cutoff is 1 Hz, and its gain for what is infinitely fast."""
-    zeros, poles, gain = _design(kind, order, ripple, attenuation)
-    apart = poles[:, None] - poles[None, :] + np.eye(poles.size)
-    weights = gain * np.prod(poles[:, None] - zeros[None, :], axis=1) / np.prod(apart, axis=1)
-    upper = poles.imag >= 0.0
-    paired = np.where(poles.imag > 0.0, 2.0, 1.0)[upper] * weights[upper]
-    return poles[upper], paired, gain if zeros.size == poles.size else 0.0
-
-
-def _section(step: complex, weight: complex) -> tuple[list[float], list[float]]:
-    """Coefficients over ticks of the real part of weight·p/(s − p) with step = p·interval, for straight lines.
-
-    With a = p·interval, k = eᵃ and z⁻¹ a tick before, weight·((k − 1 − a) + (1 + k·(a − 1))·z⁻¹)/(a·(1 − k·z⁻¹)).
-    """
-    kept = cmath.exp(step)
-    now = weight / step * complex(np.expm1(step) - step)
-    before = weight / step * (1.0 + kept * (step - 1.0))
-    if step.imag == 0.0:
-        return [now.real, before.real], [1.0, -kept.real]
-    across = [now.real, (before - now * kept.conjugate()).real, -(before * kept.conjugate()).real]
-    return across, [1.0, -2.0 * kept.real, abs(kept) ** 2]
 
 
 def _plain(channel: ImportedChannel) -> dict[str, Any]:

@@ -19,8 +19,8 @@ from mcap.writer import CompressionType, Writer
 from common.errors import InputError
 from common.recording.checksums import CHECKSUMS, checksum, sealed
 from common.recording.chunks import Block, pack_messages
-from common.recording.imported import Samples
 from common.recording.index import pack_index
+from common.recording.logger.low_pass import Samples
 from common.recording.run import GROUND
 from common.recording.schema import message_class, message_name, schema_file
 from common.roles import SLAVE

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from common.recording.imported import later
+from common.recording.logger.passing import later
 from diagnosis.findings.found import Diagnosis
 from diagnosis.fits import residuals
 from diagnosis.fits.worth import SEEN

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from common.recording.imported import ImportedChannel, LoggerFilter, averaged
+from common.recording.imported import ImportedChannel
+from common.recording.logger.low_pass import LoggerFilter
+from common.recording.logger.passing import averaged
 from diagnosis.signals.earlier import earlier
 from models.registry import Array
 

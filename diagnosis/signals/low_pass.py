@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from common.recording.imported import FILTERS, NOTHING_STATED, ImportedChannel, LoggerFilter
+from common.recording.imported import NOTHING_STATED, ImportedChannel
+from common.recording.logger.low_pass import FILTERS, LoggerFilter
 from diagnosis.signals.mask import Mask
 from models.registry import Array
 

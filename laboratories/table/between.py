@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from common.recording.imported import later
+from common.recording.logger.passing import later
 from laboratories.table import motor
 from models.registry import Array
 from models.system import System

@@ -14,11 +14,11 @@ from common.recording.imported import (
     NOTHING_STATED,
     ImportedChannel,
     ImportedData,
-    LoggerFilter,
     exchange_known,
     imported,
-    later,
 )
+from common.recording.logger.low_pass import LoggerFilter
+from common.recording.logger.passing import later
 from common.recording.run import Run
 
 LOW_PASS = LoggerFilter("butterworth", 4, 100.0)

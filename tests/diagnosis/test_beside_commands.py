@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, ImportedData, LoggerFilter
+from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, ImportedData
+from common.recording.logger.low_pass import LoggerFilter
 from common.roles import MASTER
 from diagnosis.recorded.logger.beside_commands import beside_commands
 from diagnosis.recorded.record import Record

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, ImportedData, LoggerFilter
+from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, ImportedData
+from common.recording.logger.low_pass import LoggerFilter
 from common.roles import MASTER
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged import filters, logger

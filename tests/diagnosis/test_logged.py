@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, LoggerFilter
+from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel
+from common.recording.logger.low_pass import LoggerFilter
 from common.roles import MASTER
 from diagnosis.findings import gaps, how_far, report, verdict
 from diagnosis.findings.certainty import costs, trust

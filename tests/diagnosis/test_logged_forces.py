@@ -10,7 +10,8 @@ import pytest
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
-from common.recording.imported import IMPORT, ImportedChannel, ImportedData, LoggerFilter
+from common.recording.imported import IMPORT, ImportedChannel, ImportedData
+from common.recording.logger.low_pass import LoggerFilter
 from common.roles import MASTER
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.unexplained import leaves

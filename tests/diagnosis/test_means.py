@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from common.recording.imported import ImportedChannel, averaged
+from common.recording.imported import ImportedChannel
+from common.recording.logger.passing import averaged
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged import filters, means
 from diagnosis.fits import fitting, residuals, settling, worth

@@ -11,7 +11,8 @@ import pytest
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
-from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel, LoggerFilter
+from common.recording.imported import IMPORT, NOTHING_STATED, ImportedChannel
+from common.recording.logger.low_pass import LoggerFilter
 from common.roles import MASTER
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged import filters, logger, means, shapes

@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from common.recording.imported import IMPORT, ImportedChannel, ImportedData, LoggerFilter
+from common.recording.imported import IMPORT, ImportedChannel, ImportedData
+from common.recording.logger.low_pass import LoggerFilter
 from diagnosis.findings.certainty.other_causes import EITHER, other_causes
 from diagnosis.findings.certainty.trust import trusted
 from diagnosis.findings.verdict import judge

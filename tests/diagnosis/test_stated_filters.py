@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from common.recording.imported import IMPORT, ImportedChannel, LoggerFilter
+from common.recording.imported import IMPORT, ImportedChannel
+from common.recording.logger.low_pass import LoggerFilter
 from common.roles import MASTER
 from diagnosis.diagnose import diagnose, put_right
 from diagnosis.findings.logged import delays, logger

@@ -10,7 +10,8 @@ import pytest
 from scipy import signal
 
 from common.plan.plan import Plan
-from common.recording.imported import LoggerFilter, later
+from common.recording.logger.low_pass import LoggerFilter
+from common.recording.logger.passing import later
 from laboratories.table import between
 from models.registry import Array
 from models.system import System

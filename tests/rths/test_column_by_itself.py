@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from common.recording.imported import NOTHING_STATED, ImportedChannel, LoggerFilter
+from common.recording.imported import NOTHING_STATED, ImportedChannel
+from common.recording.logger.low_pass import LoggerFilter
 from common.recording.reader import read as read_recording
 from diagnosis.recorded import record
 from diagnosis.recorded.column_alone import ColumnAlone, apart

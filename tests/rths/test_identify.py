@@ -44,7 +44,7 @@ COLUMN = 'column_displacement = { column = "a" }\ncolumn_force = { column = "b" 
 
 
 def test_the_filter_that_a_map_states_is_no_delay_of_the_drive(identified: Any) -> None:
-    from common.recording.imported import LoggerFilter
+    from common.recording.logger.low_pass import LoggerFilter
 
     command = np.cumsum(np.random.default_rng(2).standard_normal(ROWS)) * 1e-5
     position, share = np.zeros(ROWS), 1.0 - math.exp(-STEP / 0.03)

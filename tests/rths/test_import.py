@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.recording.imported import LoggerFilter
+from common.recording.logger.low_pass import LoggerFilter
 from common.recording.reader import read
 from diagnosis.recorded import slips
 from diagnosis.recorded.record import build

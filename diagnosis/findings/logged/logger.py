@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from common.recording.imported import ImportedChannel, LoggerFilter
+from common.recording.imported import ImportedChannel
+from common.recording.logger.low_pass import LoggerFilter
 from diagnosis.findings.certainty.covariances import FOREIGN, covariance
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged import delays, means, shapes

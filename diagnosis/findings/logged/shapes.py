@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from common.recording.imported import NOTHING_STATED, RIPPLING, ImportedChannel, LoggerFilter
+from common.recording.imported import NOTHING_STATED, ImportedChannel
+from common.recording.logger.low_pass import RIPPLING, LoggerFilter
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged.filters import ANY_GAIN
 from diagnosis.findings.logged.nominal_fits import (

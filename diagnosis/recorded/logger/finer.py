@@ -10,7 +10,8 @@ import numpy as np
 from scipy import ndimage, signal
 
 from common.plan.kinds import COLUMN
-from common.recording.imported import NOTHING_STATED, ImportedChannel, later
+from common.recording.imported import NOTHING_STATED, ImportedChannel
+from common.recording.logger.passing import later
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.logger.through import through_logger
 from loop import replay

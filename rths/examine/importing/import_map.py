@@ -14,7 +14,7 @@ from common.plan.plan import Plan
 from common.plan.schema import as_type, fill, key, nearest
 from common.plan.toml_file import load_tables
 from common.plan.units import converted
-from common.recording.imported import FILTERS, RIPPLING, LoggerFilter
+from common.recording.logger.low_pass import FILTERS, RIPPLING, LoggerFilter
 from common.roles import MASTER, latency_topic, name_of
 from common.signals import FieldType, Signal
 from report.text.text_form import SPACES, StatedForm
