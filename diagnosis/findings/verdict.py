@@ -176,8 +176,8 @@ def how_well(search: Search) -> Outcome:
 def falls_short(search: Search) -> bool:
     """Whether effects leave more than noise, strain nominal parameters, explain too small a gap or stand elsewhere.
 
-    What a small gap has beside an error of one reading may be too small to be seen in another one, which then tells
-    the site all the same.
+    An error of one reading may take so much of a small gap that what it leaves in another one cannot be seen. All
+    readings together may tell all the same that a machine is at fault.
     """
     fit = search.chosen
     strained = bool(pinned(fit)) or farthest(fit) < HALF or bool(at_end(fit))

@@ -14,7 +14,7 @@ import numpy as np
 
 from common.plan.kinds import COLUMN
 from common.plan.plan import Plan
-from common.recording.imported import at_rest
+from common.recording.imported import ImportedData, at_rest
 from diagnosis.recorded.commands import followed
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.recorded.logger.beside_commands import beside_commands
@@ -167,6 +167,10 @@ class LaboratoryPart:
         self.devices = lab.commands
         self.units = {name: record.unit(name) for name in self.devices}
         self.inputs = {name: record.signals.get(name, np.zeros(record.ticks)) for name in self.devices}
+        stated = record.stated or ImportedData("")
+        sent = {name: stated.channel(lab.role, name) for name in self.devices if record.has(name)}
+        # what such a channel added to a command moved nothing
+        self.inputs |= {name: smoothed(self.inputs[name]) for name, one in sent.items() if one.blunt}
         self.wanted = self.targets(record)
         self.measured, self.present = outputs(record, self.signals)
         machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]
@@ -187,11 +191,8 @@ class LaboratoryPart:
         held = lab.kind.name == COLUMN and lab.plan.actuator.command == "held"
         self.steps = 0 if held else record.steps if self.built_in else min(record.steps, 1)
         self.interval, self._decay = record.plan.test.interval, lab.kind.decay(lab.plan)
-        if record.stated is not None:
-            sent = [record.stated.channel(lab.role, name) for name in self.devices if record.has(name)]
-            self.channels = beside_commands(self.logged_by, sent, 0.0 if self.steps else HALF * self.interval)
-            if any(one.blunt for one in sent):  # what such a channel added to a command moved nothing
-                self.inputs = {name: smoothed(values) for name, values in self.inputs.items()}
+        late = 0.0 if self.steps else HALF * self.interval
+        self.channels = beside_commands(self.logged_by, [*sent.values()], late)
         self.early = 0.0 if self.steps or record.numbered else self.interval
         self.nuisances = (*nuisances(lab, names), *calibrations(record, lab, self.channels))
         pairs = zip(self.signals, lab.kind.channels.names, self.measured.T, strict=True)

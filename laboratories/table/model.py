@@ -103,7 +103,7 @@ def build(
     limits += [on_damper.force_limit_sharpness]
     limits += [*valve(table, on_table), on_damper.asymmetry, *behind_coupling, on_table.presliding]
     limits += [*fed(interval, table, on_table), on_table.velocity_limit_sharpness]
-    limits += [on_damper.damping_exponent, on_damper.stiffening, *borne(table, on_table, on_damper)]
+    limits += [on_damper.damping_exponent, on_damper.stiffening, *from_outside(table, on_table, on_damper)]
     return TableLab(
         taps,
         walk,
@@ -137,7 +137,9 @@ def valve(table: ShakingTable, effects: TableEffects) -> tuple[float, float, flo
     return effects.velocity_limit, omega / twice, twice * omega
 
 
-def borne(table: ShakingTable, on_table: TableEffects, on_damper: DamperEffects) -> tuple[float, float]:
+def from_outside(
+    table: ShakingTable, on_table: TableEffects, on_damper: DamperEffects
+) -> tuple[float, float]:
     """What `limits` holds of a constant force on the damper from outside the table, from place `OUTSIDE` on."""
     outside = on_damper.offset_outside * on_damper.offset
     if on_table.compliance == 0.0:

@@ -27,6 +27,7 @@ from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.recorded.record import Record
 from laboratories.effects import CATALOGUE, checked, lay
 from models.registry import Array
+from models.system import System
 from tests.diagnosis.cases import Cases, lab_a, lab_b, white
 
 SECONDS = 8.0
@@ -54,6 +55,11 @@ def commanded(part: LaboratoryPart, number: int, change: Callable[[Array], Array
 def ripple(values: Array) -> Array:
     """Values with a sine of 9 Hz, as of a pump."""
     return values + 2e-4 * np.sin(2.0 * np.pi * 9.0 * 2e-3 * np.arange(values.size))
+
+
+def slow_ripple(values: Array) -> Array:
+    """Values with a larger sine of 3 Hz."""
+    return values + 5e-4 * np.sin(2.0 * np.pi * 3.0 * 2e-3 * np.arange(values.size))
 
 
 def judged(part: LaboratoryPart, data: Data, truth: Array) -> Fit:
@@ -269,6 +275,24 @@ def test_a_force_that_follows_from_the_motion_that_was_read_is_none_of_the_speci
         part.measured = nominal + noise
         part.measured[:, column] = softer(part.measured[:, column])
         assert likely.follows_motion(part, data.system) == ()
+
+
+def test_what_shakes_an_actuator_beside_a_column_that_yields_lies_at_the_actuator(
+    cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A signature is of small changes; where the column stands afterwards is none."""
+    whole = cases.record(duration=SECONDS)
+    most = float(np.max(np.abs(whole.signals["column_displacement"])))
+    yields = {"yield_displacement": 0.35 * most, "hardening": 0.02}
+    column = replace(whole.plan.column, model="bilinear", parameters=yields)
+    plan = replace(whole.plan, column=column)
+    part = lab_a(whole)
+    part = part.replaced(lab=replace(part.lab, plan=plan))
+    data = replace(residuals.prepare(part, whole), system=System(plan))
+    bare = judged(part, data, commanded(part, 0, slow_ripple).predict(data.system))
+    assert ranked(bare)[0].site == "actuator"
+    monkeypatch.setattr(likely, "follows_motion", lambda *_: ())
+    assert ranked(bare)[0].site == "column"
 
 
 def test_a_building_has_no_likely_sites(cases: Cases) -> None:

@@ -17,7 +17,7 @@ from laboratories.table.kind import TABLE
 from loop import replay
 from models.registry import Array
 from models.system import System
-from tests.diagnosis.cases import Cases, named
+from tests.diagnosis.cases import Cases, estimate, named
 from tests.diagnosis.specimens import (
     INTERVAL,
 )
@@ -137,3 +137,10 @@ def test_a_constant_force_needs_no_bias_of_its_reading(cases: Cases, law: float)
     found = report["which"][0]["parameters"]["damper.offset"]
     assert found["force"]["value"] == pytest.approx(2.0, rel=0.02)
     assert ("law" in found and found["law"]["value"] == 1.0) == (law == 1.0)
+
+
+@pytest.mark.long
+def test_a_cable_chain_that_bends_over_millimetres_is_friction(cases: Cases) -> None:
+    report = cases.report({"damper.friction": {"force": 2.0, "law": 2.0, "presliding": 8e-3}})
+    assert named(report) == ["damper.friction"]
+    assert estimate(report, "damper.friction", "presliding") == pytest.approx(8e-3, rel=0.1)

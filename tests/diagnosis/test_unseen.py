@@ -21,7 +21,7 @@ from models.system import System
 from tests.diagnosis.cases import Cases, imported, lab_a, white
 
 SLOW = ImportedChannel(interpolated=True, rate=201.0)
-COMMAND, MOTION, FORCE = "actuator_command", "column_displacement", "column_force"
+COMMAND = "actuator_command"
 
 
 def shaken(whole: Record, noise: float) -> tuple[Record, Array]:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from models.registry import Array
+from report.text.tabular import read_table
 from rths.examine.importing.clock_by_smoothness import clock_by_smoothness
+from rths.examine.importing.import_map import load_map
+from rths.examine.importing.onto_ticks import on_ticks
 
 INTERVAL = 2e-3
 
@@ -48,3 +53,30 @@ def test_rows_that_keep_to_the_ticks_and_noise_tell_nothing() -> None:
     assert clock_by_smoothness(times[:150], [moved(INTERVAL * ticks[:150])], INTERVAL) is None
     fast, ticks = logged(1024.0, 0.3e-3, 20.0, 30.0)
     assert clock_by_smoothness(fast, [moved(INTERVAL * ticks)], INTERVAL) is None  # repeats tell more
+
+
+def test_few_rows_in_a_long_time_tell_nothing() -> None:
+    times, ticks = 3.0 * np.arange(210.0), np.floor(3.0 * np.arange(210.0) / 0.04)
+    assert clock_by_smoothness(times, [np.sin(ticks), 0.0 * ticks], 0.04) is None
+
+
+def test_an_import_puts_slow_rows_onto_the_ticks_of_the_controller(tmp_path: Path) -> None:
+    times, ticks = logged(256.0, 0.7e-3, 20.0, 20.0)
+    target = 0.01 * moved(INTERVAL * ticks)
+    rows = (f"{t:.6f},{value:.9f},{0.0:.1f}" for t, value in zip(times, target, strict=True))
+    (tmp_path / "log.csv").write_text("t,target,read\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    (tmp_path / "plan.toml").write_text('[test]\nname = "slow"\nduration = 20.0\n', encoding="utf-8")
+    (tmp_path / "map.toml").write_text(
+        'plan = "plan.toml"\ntime = "t"\n[signals]\ntable_target = { column = "target", unit = "m" }\n'
+        'table_displacement = { column = "read", unit = "m" }\n',
+        encoding="utf-8",
+    )
+    mapping = load_map(tmp_path / "map.toml")
+    found = on_ticks(mapping, read_table(tmp_path / "log.csv"), tmp_path / "log.csv")
+    assert found.clock is not None
+    assert found.clock.fast == pytest.approx(2e-5, abs=2e-6)
+    inside = slice(10, -10)
+    at_ticks = INTERVAL * np.arange(found.t.size, dtype=np.float64)
+    early = [moved(at_ticks + by * INTERVAL) for by in (-1.0, 0.0, 1.0)]
+    missed = [float(np.max(np.abs(found.values["table_target"] - 0.01 * one)[inside])) for one in early]
+    assert min(missed) < 1e-6  # a row at the wrong tick is up to 5e-4 m off

@@ -220,6 +220,7 @@ def findings(
     usual = max(float(np.median(list(ratios.values()))) if ratios else 1.0, LEAST_SCALE)
     result = []
     stated = stated_steps(record)
+    # a text's digits may be finer than the steps of the converter before it, which the map states
     whole = {name: max(stated.get(name, 0.0), rounded.get(name, 0.0)) for name in (*stated, *rounded)}
     coarse = coarsest(record, whole) | stated
     for name, step in rounded.items():

@@ -42,9 +42,8 @@ LOUDER = 4.0
 # Of the noise at the highest frequencies before a test, up to which it is that of the test: both are known to 3 %, and
 # readings that were moved in time have less.
 AS_LOUD = 1.08
-UNSEEN = (
-    0.2  # of the noise at the highest frequencies, from which on what moves a part unseen counts beside it
-)
+# Of the noise at the highest frequencies, from which on what commands moved that were not recorded counts beside it.
+UNSEEN = 0.2
 LOWER = 0.9  # of the noise first found, from which on a lower one is believed
 
 

@@ -17,7 +17,7 @@ from rths.examine.importing.ticks import ControllerClock
 
 SLOWER = 0.97  # rows in an interval, below which they pass over ticks
 FASTEST = 1e-4  # by which clocks differ at most
-BEGUN = 20.0  # s, of the beginning by which a clock is found roughly
+BEGUN = 20.0  # s, of the beginning by which a clock is found roughly, or more for rows that are few
 MOST_DOUBLED = 16  # times that this beginning is made twice as long
 # Of an interval, by which clocks are tried that begin elsewhere or are elsewhere at the end, closer and closer, and how
 # many such steps to each side.
@@ -43,15 +43,24 @@ def clock_by_smoothness(times: Array, channels: Iterable[Array], interval: float
     """The clock by numbers of a controller (n,) at times (n,) of a logger, s; None where none of them tells it."""
     if times.size < FEWEST or interval > SLOWER * float(np.median(np.diff(times))):
         return None
-    found = [best(times, values, interval) for values in channels if np.ptp(values) > 0.0]
-    sure = [one for one in found if one.share < SURELY]
-    return min(sure, key=lambda one: one.share).clock if sure else None
+    begun = times <= beginning(times)
+    moving = [values for values in channels if np.ptp(values[begun]) > 0.0]
+    if not moving:
+        return None
+    smoothest = min(moving, key=lambda values: best(times[begun], values[begun], interval).share)
+    found = best(times, smoothest, interval)
+    return found.clock if found.share < SURELY else None
+
+
+def beginning(times: Array) -> float:
+    """The time (s) up to which a clock is found roughly, of times (n,)."""
+    return max(BEGUN, float(times[FEWEST - 1]))
 
 
 def best(times: Array, values: Array, interval: float) -> Fitted:
     """The clock by which a motion (n,) is smoothest: by its beginning first, by more and more, and then closer."""
-    whole = float(times[-1])
-    lengths = [BEGUN * 2.0**power for power in range(MOST_DOUBLED) if BEGUN * 2.0**power < whole]
+    whole, begun = float(times[-1]), beginning(times)
+    lengths = [begun * 2.0**power for power in range(MOST_DOUBLED) if begun * 2.0**power < whole]
     looks = [*((lasts, FINER[0]) for lasts in lengths), *((whole, step) for step in FINER)]
     clock, most, least = ControllerClock(interval, 0.0, 0.0), 0.0, 0.0
     for lasts, step in looks:

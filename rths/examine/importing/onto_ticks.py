@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -181,14 +181,17 @@ def clock_in(
     if (own := rows_of_controller(mapping, table, data, rows)) is not None:
         there = None if ground is None or np.isnan(ground[own]).any() else ground[own]
         return clock_by_rows(theirs[own], interval, there, planned), planned
-    channels = columns_of(mapping, table, data, rows)
+    channels = columns_of(mapping.signals.values(), table, data, rows)
     if ground is not None and planned is not None and np.isfinite(ground).all():
         found = clock_by_ground(theirs, ground, planned, interval, channels)
         if found is not None:
             return found, planned
     if (found := clock_of(theirs, channels, interval)) is not None:
         return found, None
-    return clock_by_smoothness(theirs, columns_of_controller(mapping, table, data, rows), interval), None
+    computed = of_controller(mapping.plan)
+    sources = [one for name, one in mapping.signals.items() if name in computed]
+    numbers = [one for one in sources if one.filter is None and not one.late]
+    return clock_by_smoothness(theirs, columns_of(numbers, table, data, rows), interval), None
 
 
 def recorded_ground(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> Array | None:
@@ -240,22 +243,9 @@ def of_controller(plan: Plan) -> set[str]:
     }
 
 
-def columns_of(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> list[Array]:
-    """The columns (rows,) of the data that are signals and have a number in every row."""
-    columns = [
-        pick(table, source.column, data)[rows] for source in mapping.signals.values() if source.value is None
-    ]
-    return [one for one in columns if np.isfinite(one).all()]
-
-
-def columns_of_controller(mapping: ImportMap, table: DataTable, data: Path, rows: Any) -> list[Array]:
-    """The columns (rows,) of the data that a controller computed, as numbers, and that have one in every row."""
-    computed = of_controller(mapping.plan)
-    columns = [
-        pick(table, source.column, data)[rows]
-        for name, source in mapping.signals.items()
-        if name in computed and source.value is None and source.filter is None and not source.late
-    ]
+def columns_of(sources: Iterable[SignalSource], table: DataTable, data: Path, rows: Any) -> list[Array]:
+    """The columns (rows,) of the data that signals are read from and that have a number in every row."""
+    columns = [pick(table, source.column, data)[rows] for source in sources if source.value is None]
     return [one for one in columns if np.isfinite(one).all()]
 
 

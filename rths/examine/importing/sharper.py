@@ -21,20 +21,27 @@ def sharpened(clock: ControllerClock, low: Array, high: Array) -> ControllerCloc
 
     One that is in step stays so where it is within all of them.
     """
-
-    def held(begin: Array, last: Array) -> Array:
-        """How many bounds are held by clocks that begin later by some s, and are later by others at the last bound."""
-        ends = clock.begin + begin[..., None] + last[..., None] * (ticks / max(1.0, ticks[-1]))
-        where = ends + (1.0 + clock.fast) * clock.interval * ticks
-        return np.asarray(np.sum((low - EQUAL <= where) & (where <= high + EQUAL), axis=-1, dtype=np.float64))
-
     for share in SHARPER:
-        ticks = np.rint(clock.places(0.5 * (low + high)))
-        if not low.size or (not clock.between and held(np.zeros(1), np.zeros(1))[0] == low.size):
+        if not low.size or (
+            not clock.between and held(clock, low, high, np.zeros(1), np.zeros(1)) == low.size
+        ):
             return clock
         later = share * clock.interval * np.linspace(-1.0, 1.0, ACROSS)
-        fit = held(later[:, None], later[None, :])
+        fit = held(clock, low, high, later[:, None], later[None, :])
         begin, last = (later[places].mean() for places in np.nonzero(fit == fit.max()))
-        lasts = max(clock.interval, float(ticks[-1]) * clock.interval)
+        lasts = max(1.0, float(of_bounds(clock, low, high)[-1])) * clock.interval
         clock = clock._replace(begin=clock.begin + float(begin), fast=clock.fast + float(last) / lasts)
     return clock
+
+
+def held(clock: ControllerClock, low: Array, high: Array, begin: Array, last: Array) -> Array:
+    """How many bounds hold for clocks that begin later by `begin` s (…), and are later by `last` s (…) at the end."""
+    ticks = of_bounds(clock, low, high)
+    ends = clock.begin + begin[..., None] + last[..., None] * (ticks / max(1.0, ticks[-1]))
+    where = ends + (1.0 + clock.fast) * clock.interval * ticks
+    return np.asarray(np.sum((low - EQUAL <= where) & (where <= high + EQUAL), axis=-1, dtype=np.float64))
+
+
+def of_bounds(clock: ControllerClock, low: Array, high: Array) -> Array:
+    """The ticks (runs,) that are bounded, by a clock that is known roughly."""
+    return np.rint(clock.places(0.5 * (low + high)))

@@ -8,9 +8,7 @@ import numpy as np
 
 from models.registry import Array
 
-CHANGING = (
-    0.5  # share of the ticks at which a channel that holds its value from tick to tick changes at least
-)
+CHANGING = 0.5  # share of the ticks at which a channel that holds its value in between changes at least
 ROUNDED = 0.03  # of an interval, by which times may be off: they are rounded when printed
 ON_TICK = 0.01  # of an interval, within which a row is on its tick
 SHARP = 1e-3  # of an interval, the same of rows that are hardly closer than ticks
@@ -44,7 +42,7 @@ class ControllerClock(NamedTuple):
         place = f"{1e3 * abs(self.begin):.2g} ms {side} the first row" if self.begin else "at the first row"
         rate = f", and the data's clock is {'fast' if self.fast > 0.0 else 'slow'} by {1e6 * abs(self.fast):.2g} ppm"
         return (
-            f"clock: what the controller holds shows that its first tick is {place}{rate if self.fast else ''}; all "
+            f"clock: the controller's own numbers show that its first tick is {place}{rate if self.fast else ''}; all "
             "channels were put onto its ticks"
         )
 
