@@ -27,9 +27,7 @@ BLOCK = 100  # ticks, in which a clock gains little
 # Share of the bounds in a block that may be missed: times are rounded when printed, and a controller is late at times.
 MISSED = 0.05
 TOWARDS = 0.1  # of an interval
-# Of an interval, half the width of bounds below which they say on which side of a tick another one is: a row of hardly
-# less than an interval has its tick anywhere.
-TELLING = 0.4
+BOUNDED = 0.8  # of an interval: bounds that are farther apart say hardly anything of a tick
 STEADY = 0.2  # share of the usual width of bounds that all of them have in common, of a clock that is in step
 FASTEST, STEP = 1e-3, 5e-7  # of clocks: what any errs by at most, and between rates that are tried
 # Of the ground: ticks around a row at which it may have been taken, distance to one over that to all others below which
@@ -162,7 +160,7 @@ def clock_by_changes(
     begin = float(centre[0]) if known is None else known.begin / interval
     limits[1:] += interval * turns(centre, begin, passed(times, values, interval, limits[0]))
     found = within(limits, interval, turning=known is None)
-    near = high - low < 2.0 * TELLING * interval
+    near = high - low < BOUNDED * interval
     hardly = hardly_faster(times, interval)
     return sharpened(found, low[near], high[near]) if found and hardly else found
 
@@ -214,10 +212,9 @@ def in_common(low: Array, high: Array, interval: float) -> tuple[float, float, f
     turned = np.sum(narrow * np.exp(2j * np.pi * middle / interval))
     about = float(np.angle(turned)) / (2.0 * np.pi) * interval
     off = (middle - about + 0.5 * interval) % interval - 0.5 * interval
-    half = 0.5 * (high - low)
-    across = np.abs(off[half < TELLING * interval]) > (0.5 - ROUNDED) * interval
-    if across.size and np.mean(across) > MISSED:
+    if np.mean(np.abs(off) > (0.5 - ROUNDED) * interval) > MISSED:
         return float(np.mean(middle)), math.inf, -math.inf
+    half = 0.5 * (high - low)
     least, most = np.quantile(off - half, 1.0 - MISSED), np.quantile(off + half, MISSED)
     return float(np.mean(middle)), about + float(least), about + float(most)
 
