@@ -14,7 +14,7 @@ from diagnosis.recorded.logger.beside_commands import beside_commands
 from diagnosis.recorded.record import Record
 from models.registry import Array
 from models.system import System
-from tests.diagnosis.cases import Cases, imported, lab_a
+from tests.diagnosis.cases import Cases, imported, lab_a, white
 
 COMMAND = "actuator_command"
 BESSEL = ImportedChannel(LoggerFilter("bessel", 4, 40.0), delay=2e-3, resolution=0.1, calibration=0.01)
@@ -54,9 +54,18 @@ def through(whole: Record) -> tuple[Record, Array]:
 def test_a_laboratory_whose_command_passed_the_filter_of_its_readings_is_predicted(cases: Cases) -> None:
     logged, read = through(cases.record(duration=8.0))
     part = lab_a(logged)
+    assert np.array_equal(part.passes, [40.0, 40.0])  # what the logger's filters pass, also those of commands
     missed = part.predict(System(part.lab.plan)) - read
     assert np.all(np.std(missed, axis=0) < 0.005 * np.std(read, axis=0))
     part.channels = part.logged_by
     late = part.predict(System(part.lab.plan)) - read
     assert np.all(np.std(late, axis=0) > 0.1 * np.std(read, axis=0))
-    assert np.array_equal(part.passes, [40.0, 40.0])
+
+
+def test_noise_of_a_command_s_channel_moves_nothing(cases: Cases) -> None:
+    logged, _ = through(cases.record(duration=8.0))
+    noisy = logged.signals[COMMAND] + 2e-5 * white(3, logged.signals[COMMAND].size)
+    part, quiet = lab_a(replace(logged, signals=logged.signals | {COMMAND: noisy})), lab_a(logged)
+    inside = slice(50, -50)
+    heard = float(np.std((part.inputs[COMMAND] - quiet.inputs[COMMAND])[inside]))
+    assert heard < 0.75 * 2e-5

@@ -118,6 +118,10 @@ def test_a_step_like_those_stated_of_other_channels_is_that_of_the_converter(cas
         "sensor.table_acceleration.quantization"
     ]
     assert readings.findings(logged, white, own, own, logged=True) == []
+    printed = {
+        name: 0.01 * step for name, step in steps.items()
+    } | own  # digits finer than the converter's steps
+    assert readings.findings(logged, white, printed, printed, logged=True) == []
 
 
 def test_noise_of_a_converter_is_attributed_to_the_logger(cases: Cases) -> None:

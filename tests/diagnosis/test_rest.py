@@ -122,3 +122,12 @@ def test_below_what_readings_at_rest_tell_only_noise_that_becomes_louder_there_m
     assert np.array_equal(most[~below], np.asarray(known.density)[~below])
     assert np.all(most[below] == (1e3 if lifted else 1.0))
     assert np.array_equal(known.at_most(0.0 * other), np.asarray(known.density))
+
+
+def test_noise_at_rest_is_not_that_of_a_part_which_unseen_commands_move(cases: Cases) -> None:
+    data, place, level = with_rest(cases, 1.0, 0.0)
+    assert isinstance(data.part, LaboratoryPart)
+    still = data.part.replaced(blurred=0.01 * level)
+    assert sensor_noise.before_the_test(replace(data, part=still), place) is not None
+    moved = data.part.replaced(blurred=10.0 * level)
+    assert sensor_noise.before_the_test(replace(data, part=moved), place) is None

@@ -9,9 +9,9 @@ import pytest
 
 from models.registry import Array
 from report.text.tabular import read_table
-from rths.examine.importing.clock_by_smoothness import clock_by_smoothness
+from rths.examine.importing.clock_by_smoothness import beginning, clock_by_smoothness
 from rths.examine.importing.import_map import load_map
-from rths.examine.importing.onto_ticks import on_ticks
+from rths.examine.importing.onto_ticks import OnTicks, on_ticks
 
 INTERVAL = 2e-3
 
@@ -60,19 +60,29 @@ def test_few_rows_in_a_long_time_tell_nothing() -> None:
     assert clock_by_smoothness(times, [np.sin(ticks), 0.0 * ticks], 0.04) is None
 
 
-def test_an_import_puts_slow_rows_onto_the_ticks_of_the_controller(tmp_path: Path) -> None:
+def test_rows_that_are_few_in_twenty_seconds_are_looked_at_for_longer() -> None:
+    assert beginning(np.arange(4000) / 200.0) == 20.0
+    assert beginning(np.arange(400) / 4.0) == 49.75  # two hundred rows
+
+
+def imported(folder: Path, stated: str) -> OnTicks:
+    """An import of a slow logger's table command, of which the map states something more."""
     times, ticks = logged(256.0, 0.7e-3, 20.0, 20.0)
     target = 0.01 * moved(INTERVAL * ticks)
     rows = (f"{t:.6f},{value:.9f},{0.0:.1f}" for t, value in zip(times, target, strict=True))
-    (tmp_path / "log.csv").write_text("t,target,read\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    (tmp_path / "plan.toml").write_text('[test]\nname = "slow"\nduration = 20.0\n', encoding="utf-8")
-    (tmp_path / "map.toml").write_text(
-        'plan = "plan.toml"\ntime = "t"\n[signals]\ntable_target = { column = "target", unit = "m" }\n'
+    (folder / "log.csv").write_text("t,target,read\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    (folder / "plan.toml").write_text('[test]\nname = "slow"\nduration = 20.0\n', encoding="utf-8")
+    (folder / "map.toml").write_text(
+        'plan = "plan.toml"\ntime = "t"\n[signals]\n'
+        f'table_target = {{ column = "target", unit = "m"{stated} }}\n'
         'table_displacement = { column = "read", unit = "m" }\n',
         encoding="utf-8",
     )
-    mapping = load_map(tmp_path / "map.toml")
-    found = on_ticks(mapping, read_table(tmp_path / "log.csv"), tmp_path / "log.csv")
+    return on_ticks(load_map(folder / "map.toml"), read_table(folder / "log.csv"), folder / "log.csv")
+
+
+def test_an_import_puts_slow_rows_onto_the_ticks_of_the_controller(tmp_path: Path) -> None:
+    found = imported(tmp_path, "")
     assert found.clock is not None
     assert found.clock.fast == pytest.approx(2e-5, abs=2e-6)
     inside = slice(10, -10)
@@ -80,3 +90,10 @@ def test_an_import_puts_slow_rows_onto_the_ticks_of_the_controller(tmp_path: Pat
     early = [moved(at_ticks + by * INTERVAL) for by in (-1.0, 0.0, 1.0)]
     missed = [float(np.max(np.abs(found.values["table_target"] - 0.01 * one)[inside])) for one in early]
     assert min(missed) < 1e-6  # a row at the wrong tick is up to 5e-4 m off
+
+
+@pytest.mark.parametrize(
+    "stated", [', filter = { type = "butterworth", order = 2, cutoff = 30.0 }', ", delay = 0.001"]
+)
+def test_a_command_that_was_filtered_or_comes_late_tells_no_tick(tmp_path: Path, stated: str) -> None:
+    assert imported(tmp_path, stated).clock is None
