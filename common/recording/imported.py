@@ -58,6 +58,7 @@ class ImportedChannel:
     followed: bool = False  # whether it is the plan's own motion between the ticks that its rows showed
     means: int = 1  # how many such means follow one another: three in a converter with a sinc³ filter
     smooth: bool = False  # whether a filter without any other trace took away what is faster than the ticks
+    printed: float = 0.0  # step of its decimals in a text that has as many in each row, 0 for any other data
     at_ticks: bool = False  # whether its filter was given the readings at the ticks alone, as a digital one
 
     @property

@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 from common.errors import InputError
 from common.plan.units import is_unit
 from report.text.cells import Notation, numbers, times
+from report.text.decimals import fixed_decimals
 from report.text.file_kind import is_text, unreadable
 from report.text.lines import LABVIEW, lines_of
 from report.text.misread import misread
 from report.text.text_form import (
     SPACES,
     UNSTATED,
+    Rows,
     StatedForm,
     TextForm,
     is_number,
@@ -38,6 +40,7 @@ Columns = dict[str, NDArray[np.float64]]
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm")
 READABLE = (*TEXTS, ".parquet", ".mat", ".npz")
 WRITABLE = (".csv", ".parquet", ".mat")
+SEEN = 2000  # rows of a text, by which its decimals are counted
 WIDE = "utf-16"  # the encoding in which some loggers for Windows write
 MAT_NAME = 63  # characters that MATLAB allows
 WHOLE, LARGEST = 1 << 20, (1 << 31) - 1  # bytes more than a file, and at most, that are read as one block
@@ -65,6 +68,9 @@ class DataTable(NamedTuple):
     form: TextForm | None = None  # of a text file
     twice: frozenset[str] = frozenset()  # names of more than one column
     texts: Mapping[str, str] = MappingProxyType({})  # by name of a column of texts, one of these
+    decimals: Mapping[str, int] = MappingProxyType(
+        {}
+    )  # of the columns of a text that all numbers have as many of
 
 
 def read(path: Path) -> Columns:
@@ -119,7 +125,8 @@ def _read_text(path: Path, stated: StatedForm) -> DataTable:
     """A text file in UTF-8, in UTF-16 with its mark, or in Latin-1 as older loggers write it."""
     encoding = _encoding(path)
     form = recognised(path, encoding, stated)
-    below = _units(path, form, encoding)
+    beginning = _beginning(path, form, encoding)
+    below = _units(beginning, form)
     table = _arrow_table(path, form, encoding, units=bool(below))
     names = [unmarked(name).strip() for name in table.column_names]
     columns, texts = _numeric(table.rename_columns(names), form.notation)
@@ -134,6 +141,7 @@ def _read_text(path: Path, stated: StatedForm) -> DataTable:
         form,
         twice,
         {name: next(filter(None, cells), "") for name, cells in texts.items() if name not in columns},
+        fixed_decimals(beginning[1:], names, form.notation),
     )
 
 
@@ -196,16 +204,19 @@ def _encoding(path: Path) -> str:
     return "utf-8"
 
 
-def _units(path: Path, form: TextForm, encoding: str) -> dict[str, str]:
-    """The row below the names where it holds texts and no number, by name: a row of units; empty where it is data."""
+def _beginning(path: Path, form: TextForm, encoding: str) -> Rows:
+    """The cells of the row of names and of some below it."""
     whole = lines_of(path, f"{encoding}-sig" if encoding == "utf-8" else encoding)
-    lines = list(itertools.islice(whole, form.skip_rows, form.skip_rows + 2))
-    rows = split(lines, form.separator)
+    return split(list(itertools.islice(whole, form.skip_rows, form.skip_rows + SEEN)), form.separator)
+
+
+def _units(rows: Rows, form: TextForm) -> dict[str, str]:
+    """The row below the names where it holds texts and no number, by name: a row of units; empty where it is data."""
     if len(rows) < 2 or not any(cell.strip() for cell in rows[1]):
         return {}
     if any(is_number(cell, form.notation) for cell in rows[1]) or times(rows[1][:1]) is not None:
         return {}
-    return {name.strip(): unit.strip().strip("[]()") for name, unit in zip(*rows, strict=False)}
+    return {name.strip(): unit.strip().strip("[]()") for name, unit in zip(*rows[:2], strict=False)}
 
 
 def in_name(name: str) -> str:

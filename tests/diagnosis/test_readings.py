@@ -9,7 +9,7 @@ import pytest
 
 from common.recording.imported import IMPORT, ImportedChannel, ImportedData
 from common.recording.reader import read
-from common.roles import MASTER
+from common.roles import MASTER, SLAVE
 from diagnosis.findings.sensors import readings
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.fits import residuals
@@ -123,6 +123,21 @@ def test_a_step_like_those_stated_of_other_channels_is_that_of_the_converter(cas
     } | own  # digits finer than the converter's steps
     printed.pop("damper_force")  # whose noise shows then
     assert readings.findings(logged, white, printed, printed, logged=True) == []
+
+
+def test_a_step_that_is_the_last_decimal_of_a_text_is_no_sensor_s(cases: Cases) -> None:
+    whole = cases.record(duration=8.0)
+    step = {"damper_stroke": 1e-5}
+    white = {"damper_stroke": 1e-9, "table_displacement": 1e-9}
+
+    def found(printed: float) -> list[SensorFinding]:
+        channels = {SLAVE: {"damper_stroke": ImportedChannel(printed=printed)}}
+        metadata = ImportedData("log.csv", channels=channels).metadata()
+        logged = replace(whole, run=replace(whole.run, metadata=whole.run.metadata | {IMPORT: metadata}))
+        return readings.findings(logged, white, step, step, logged=True)
+
+    assert found(1e-5) == []
+    assert [item.effect for item in found(1e-6)] == ["sensor.damper_stroke.quantization"]
 
 
 def test_noise_of_a_converter_is_attributed_to_the_logger(cases: Cases) -> None:

@@ -37,6 +37,14 @@ def test_units_give_the_scales_and_the_loggers_properties_are_kept(bring: Any) -
     assert not stated.interpolated
 
 
+def test_the_decimals_of_a_text_are_kept_where_all_rows_have_as_many(bring: Any) -> None:
+    rows = [f"{t:.6f},{u:.9g},{y:.2f}" for t, u, y in zip(TIMES, COMMAND, LATE, strict=True)]
+    code, run = bring("t,u,y\n" + "\n".join(rows) + "\n", DRIVE)
+    assert code == 0
+    assert known(run).channel("master", "column_displacement").printed == pytest.approx(1e-5)
+    assert known(run).channel("master", "actuator_command").printed == 0.0
+
+
 def test_a_delay_of_none_is_stated_where_the_map_gives_it(bring: Any) -> None:
     rows = DRIVE.replace("column_displacement = {", "column_displacement = { delay = 0.0,")
     _, run = bring(table("t,u,y", TIMES, COMMAND, LATE), rows)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from common.recording.imported import ImportedChannel
 from diagnosis.fits.residuals import STEPPING, Data
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.parts import FINE_ERROR
@@ -81,15 +82,23 @@ def steps(record: Record) -> dict[str, float]:
 
 def stated_steps(record: Record) -> dict[str, float]:
     """The resolution stated for channels in an import map, by signal."""
+    return {name: one.resolution for name, one in imports(record).items() if one.resolution > 0.0}
+
+
+def printed_steps(record: Record) -> dict[str, float]:
+    """The step of the last decimal of channels that were imported from a text with as many in each row, by signal."""
+    return {name: one.printed for name, one in imports(record).items() if one.printed > 0.0}
+
+
+def imports(record: Record) -> dict[str, ImportedChannel]:
+    """What an import states about the channels of readings, by signal; none of a test recorded by rths itself."""
     stated = record.stated
-    if stated is None:
-        return {}
-    rows = {
-        given: stated.channel(lab.role, name).resolution
+    return {
+        given: stated.channel(lab.role, name)
         for lab in record.labs
         for name, given in zip(lab.kind.channels.names, lab.measured, strict=True)
+        if stated is not None
     }
-    return {name: step for name, step in rows.items() if step > 0.0}
 
 
 def resolutions(record: Record, rounded: Mapping[str, float]) -> dict[str, float]:
@@ -125,13 +134,7 @@ def held(record: Record, steps: Mapping[str, float]) -> dict[str, float]:
 
 def interpolated(record: Record) -> set[str]:
     """The readings whose rows were not on the ticks when they were imported."""
-    stated = record.stated
-    return {
-        given
-        for lab in record.labs
-        for name, given in zip(lab.kind.channels.names, lab.measured, strict=True)
-        if stated is not None and stated.channel(lab.role, name).interpolated
-    }
+    return {name for name, one in imports(record).items() if one.interpolated}
 
 
 def printed(values: Array) -> bool:
@@ -223,10 +226,12 @@ def findings(
     # a text's digits may be finer than the steps of the converter before it, which the map states
     whole = {name: max(stated.get(name, 0.0), rounded.get(name, 0.0)) for name in (*stated, *rounded)}
     coarse = coarsest(record, whole) | stated
+    text = printed_steps(record)
     for name, step in rounded.items():
         expected = noise_of.get(name, 0.0) * usual
         seen = FINE_ERROR * float(np.std(record.signals[name])) * math.sqrt(12.0)
-        if step > max(COARSER * expected, SAME * coarse.get(name, 0.0), seen):
+        least = max(COARSER * expected, SAME * coarse.get(name, 0.0), SAME * text.get(name, 0.0), seen)
+        if step > least:
             size = step / np.sqrt(12.0) / expected if expected > 0.0 else 0.0
             bounds = ((1.0 - STEP_ERROR) * step, (1.0 + STEP_ERROR) * step)
             result.append(SensorFinding(effect_on(record, name, "quantization"), "step", step, bounds, size))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -163,7 +163,8 @@ def on_ticks(mapping: ImportMap, table: DataTable, data: Path, *, as_is: bool = 
         own_rate = (1.0 + fast) * (rate if own.all() else rate_of(times))
         first = 0.0 if mapping.static else (float(times[0]) - begin_) / (1.0 + fast)
         followed = apart and ticks.follows(should)
-        found.stated[name] = channel(source, row, own_rate, first, between=apart, followed=followed)
+        said = channel(source, row, own_rate, first, between=apart, followed=followed)
+        found.stated[name] = replace(said, printed=last_decimal(table, source, scale))
     return found
 
 
@@ -350,6 +351,12 @@ def scale_of(name: str, source: SignalSource, row: Signal, table: DataTable, dat
         return in_unit(unit, row, name), unit
     except PlanError as error:
         raise InputError(f"{data}: {error} Or give its scale in the map.") from None
+
+
+def last_decimal(table: DataTable, source: SignalSource, scale: float) -> float:
+    """The step of the last decimal of a column in the signal's unit; 0 where its rows differ in how many they have."""
+    decimals = table.decimals.get(source.column)
+    return 0.0 if decimals is None else abs(scale) * 10.0**-decimals
 
 
 def channel(
