@@ -38,6 +38,7 @@ LOWEST, HIGHEST, BANDS = 0.5, 80.0, 16
 # Independent lines per line of a spectrum behind Hann's window, whose neighbours share energy (F. J. Harris,
 # Proceedings of the IEEE 66 (1978), 51-83).
 OWN = 2.0 / 3.0
+NARROW = 4  # lines, over which what a filter passes changes by little
 ROUNDS = 2  # of fits, each weighted by what the one before it leaves
 FREE = 1e-6  # of what a known parameter weighs, weight of one that may have any value
 SMALLEST = 1e-4  # of a reading, residual that counts: four digits of a text file
@@ -50,8 +51,16 @@ class ReadSpectra(NamedTuple):
     frequency: Array  # (lines,) Hz
     read: Lines  # (lines, readings)
     true: Lines  # (lines, readings) without a filter
-    slopes: Lines  # (lines, readings, parameters) of these over parameters that err by about one
+    slopes: (
+        Array  # (2, lines · readings, parameters) real and imaginary parts of these over parameters near one
+    )
     starts: NDArray[np.int64]  # (bands,) first line of each band
+    bins: NDArray[
+        np.int64
+    ]  # (bins,) first line of each of some bins in these, over which no filter changes much
+    products: (
+        Array  # (bins, readings, parameters, parameters) of slopes with one another, summed over each bin
+    )
     noisy: bool  # whether the readings without a filter hold noise that those recorded need not have
     rounds: int = ROUNDS  # of fits of the parameters, one where these are nearly at their best
 
@@ -82,7 +91,12 @@ def spectra(
     frequency = frequency[kept]
     edges = np.geomspace(frequency[0], frequency[-1], bands + 1)[:-1]
     starts = np.unique(np.searchsorted(frequency, edges))
-    return ReadSpectra(frequency, lines(read), lines(true), lines(slopes), starts, noisy)
+    bins = np.union1d(starts, np.arange(0, frequency.size, NARROW))
+    moved = lines(slopes)
+    products = np.add.reduceat(np.einsum("frp,frq->frpq", moved.conj(), moved).real, bins)
+    flat = moved.reshape(moved.shape[0] * moved.shape[1], moved.shape[2])
+    parts = np.stack([flat.real, flat.imag])
+    return ReadSpectra(frequency, lines(read), lines(true), parts, starts, bins, products, noisy)
 
 
 def surprise(of: ReadSpectra, channel: ImportedChannel) -> float:
@@ -122,15 +136,17 @@ class Unlike(NamedTuple):
 def behind(of: ReadSpectra, channel: ImportedChannel, free: int | None = None) -> Unlike:
     """What is left of readings behind a filter or delay, at the best parameters, of which one may be `free`."""
     passed = channel.response(of.frequency)[:, None]
-    left, slopes = of.read - passed * of.true, passed[:, :, None] * of.slopes
+    left = of.read - passed * of.true
     least, most = SMALLEST**2 * squares(of, of.read), highest(of)
     known = np.arange(of.slopes.shape[2]) != free
     found = [Unlike(np.maximum(squares(of, left), least), 0.0)]
     for _ in range(of.rounds):
         # a band whose noise hides how the two go together tells nothing of a parameter, which would shrink that noise
         level = np.where(found[-1].level < most, found[-1].level, math.inf)
-        z = fitted(left, slopes, np.repeat(level, counts(of), axis=0), known)
-        found.append(Unlike(np.maximum(squares(of, left - slopes @ z), least), float(z[known] @ z[known])))
+        z = fitted(of, passed, left, level, known)
+        real, imaginary = (of.slopes @ z).reshape(2, *left.shape)
+        rest = left - passed * (real + 1j * imaginary)
+        found.append(Unlike(np.maximum(squares(of, rest), least), float(z[known] @ z[known])))
     return min(found, key=lambda one: weighed(of, one))
 
 
@@ -167,16 +183,19 @@ def squares(of: ReadSpectra, values: Lines) -> Array:
     return np.asarray(energy / counts(of)[:, None])
 
 
-def fitted(left: Lines, slopes: Lines, level: Array, known: Mask) -> Array:
-    """Parameters (parameters,) that leave the least, in view of mean squares of the rest and of what they err by.
+def fitted(of: ReadSpectra, passed: Lines, left: Lines, level: Array, known: Mask) -> Array:
+    """Parameters (parameters,) that leave the least behind what `passed` (lines, 1), of what is `left` without them.
 
-    Those that are not `known` may err by anything.
+    `level` (bands, readings) are mean squares of the rest. Parameters that are not `known` may err by anything.
     """
-    weights = np.sqrt(2.0 * OWN / level)
-    A = (weights[:, :, None] * slopes).reshape(-1, slopes.shape[2])
-    y = (weights * left).ravel()
-    square = (A.conj().T @ A).real + np.diag(np.where(known, 1.0, FREE))
-    return np.asarray(np.linalg.solve(square, (A.conj().T @ y).real))
+    power = np.square(passed.real) + np.square(passed.imag)
+    weights = 2.0 * OWN / level
+    lines = np.diff(np.append(of.bins, of.frequency.size))[:, None]
+    own = np.add.reduceat(power, of.bins) / lines * weights[np.searchsorted(of.starts, of.bins, "right") - 1]
+    square = np.einsum("br,brpq->pq", own, of.products) + np.diag(np.where(known, 1.0, FREE))
+    back = np.repeat(weights, counts(of), axis=0) * passed.conj() * left
+    along = back.real.ravel() @ of.slopes[0] + back.imag.ravel() @ of.slopes[1]
+    return np.asarray(np.linalg.solve(square, along))
 
 
 Shape = Callable[[float], ImportedChannel]  # a filter by the time (s) that it delays slow motion by
