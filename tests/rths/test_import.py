@@ -37,6 +37,18 @@ def test_units_give_the_scales_and_the_loggers_properties_are_kept(bring: Any) -
     assert not stated.interpolated
 
 
+def test_a_row_at_the_very_start_of_the_test_is_read(bring: Any) -> None:
+    times = 1e3 * TIMES + 100130.0 - 1e-7  # as sums of steps of a computer come out
+    code, run = bring(
+        table("t,u,y", times, COMMAND, LATE),
+        DRIVE,
+        'time = "t"\ntime_unit = "ms"\nstart = 100.13\nstop = 102.1299999999\n',
+    )
+    assert code == 0
+    assert run.columns["master"]["t"].size == 201
+    assert run.columns["master"]["column_displacement"][0] == pytest.approx(1e-3 * LATE[0], abs=1e-9)
+
+
 def test_the_decimals_of_a_text_are_kept_where_all_rows_have_as_many(bring: Any) -> None:
     rows = [f"{t:.6f},{u:.9g},{y:.2f}" for t, u, y in zip(TIMES, COMMAND, LATE, strict=True)]
     code, run = bring("t,u,y\n" + "\n".join(rows) + "\n", DRIVE)

@@ -173,6 +173,14 @@ def test_rows_that_a_logger_wrote_twice_are_left_out(bring: Any, capsys: Any, st
     assert abs(found[100] - smooth[100]) < 0.05 * abs(smooth[100] - smooth[99])
 
 
+def test_rows_of_coarse_steps_that_are_alike_where_hardly_anything_moves_stay(
+    bring: Any, capsys: Any
+) -> None:
+    motion, read = (np.where(np.arange(TIMES.size) < 4, column[4], column) for column in (COMMAND, LATE))
+    assert bring(table("t,u,y", TIMES, motion, read), DRIVE)[0] == 0
+    assert "repeat the row before them" not in capsys.readouterr().out
+
+
 def test_rows_of_a_logger_that_is_faster_than_what_it_reads_stay(bring: Any, capsys: Any) -> None:
     twice = np.repeat(np.arange(TIMES.size // 2), 2)
     assert bring(table("t,u,y", TIMES[: twice.size], COMMAND[twice], LATE[twice]), DRIVE)[0] == 0

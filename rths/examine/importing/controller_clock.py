@@ -270,4 +270,5 @@ def within(limits: Array, interval: float, *, turning: bool = True) -> Controlle
         begin -= interval * round(begin / interval)
     known, near = half - ROUNDED * interval, ON_TICK * interval
     on_tick = abs(begin) <= known + near and (known < near or begin - known < -near)
-    return ControllerClock(interval, 0.0 if on_tick else float(begin), float(rates[place]))
+    unsure = 0.0 if steady else 0.5 * float(np.ptp(rates[places]))
+    return ControllerClock(interval, 0.0 if on_tick else float(begin), float(rates[place]), unsure)

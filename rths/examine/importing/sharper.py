@@ -31,7 +31,7 @@ def sharpened(clock: ControllerClock, low: Array, high: Array) -> ControllerCloc
         begin, last = (later[places].mean() for places in np.nonzero(fit == fit.max()))
         lasts = max(1.0, float(of_bounds(clock, low, high)[-1])) * clock.interval
         clock = clock._replace(begin=clock.begin + float(begin), fast=clock.fast + float(last) / lasts)
-    return clock
+    return clock._replace(unsure=0.0)
 
 
 def held(clock: ControllerClock, low: Array, high: Array, begin: Array, last: Array) -> Array:

@@ -14,6 +14,7 @@ ON_TICK = 0.01  # of an interval, within which a row is on its tick
 SHARP = 1e-3  # of an interval, the same of rows that are hardly closer than ticks
 OTHER = 0.01  # share of neighbours within one interval that may differ in a channel that holds
 OFTEN = 0.5  # share of them from which on those whose rows are not on a tick decide
+TOLD = 2e-6  # of a clock, from which on it is said by how much its rate may err
 # Of an interval, by which rows are closer than ticks that share one too seldom to bound it well.
 HARDLY = 0.15
 
@@ -24,6 +25,7 @@ class ControllerClock(NamedTuple):
     interval: float  # s, of the controller
     begin: float  # s, of its first tick, from the first row on
     fast: float  # by how much the logger's clock is fast
+    unsure: float = 0.0  # by how much more or less it may be, of what bounds of the ticks allow
 
     @property
     def between(self) -> bool:
@@ -40,7 +42,8 @@ class ControllerClock(NamedTuple):
         """A sentence for the user."""
         side = "before" if self.begin < 0.0 else "after"
         place = f"{1e3 * abs(self.begin):.2g} ms {side} the first row" if self.begin else "at the first row"
-        rate = f", and the data's clock is {'fast' if self.fast > 0.0 else 'slow'} by {1e6 * abs(self.fast):.2g} ppm"
+        about = f"{1e6 * abs(self.fast):.2g}" + f" ± {1e6 * self.unsure:.0f}" * (self.unsure > TOLD)
+        rate = f", and the data's clock is {'fast' if self.fast > 0.0 else 'slow'} by {about} ppm"
         return (
             f"clock: the controller's own numbers show that its first tick is {place}{rate if self.fast else ''}; all "
             "channels were put onto its ticks"

@@ -18,6 +18,9 @@ from rths.examine.importing.import_map import ImportMap, in_unit
 
 ENDS = 0.02  # share of the rows that may come before a column begins, or behind its end
 REPEATED = 0.01  # share of the rows that a busy logger may have written twice
+AROUND = 101  # rows, over which is counted how often a column changes
+BY_CHANCE = 0.01  # of a row being like the one before, from which on it may come from coarse steps of what hardly moves
+NEAR = 1e-3  # of the distance of rows, within which a row is at the start or stop of a map
 FOR_A_SPLINE = 4  # rows at least
 EVENLY = 1.5  # usual distances of a channel's own rows, from which on one is missing
 
@@ -54,13 +57,17 @@ def without_repeats(mapping: ImportMap, table: DataTable, data: Path) -> tuple[D
     """The data without rows that repeat the row before them in every column of the map, and how many those are.
 
     A logger that was busy writes its last row again. The noise of several readings does not come twice; where many rows
-    repeat, the logger is faster than what it reads, or nothing moves.
+    repeat, the logger is faster than what it reads. Where nothing moves, coarse steps leave a row as the one before.
     """
+    from scipy import ndimage
+
     columns = [pick(table, source.column, data) for source in mapping.signals.values() if source.column]
     moving = [column for column in columns if np.any(column != column[:1])]
     if mapping.static or not mapping.time or len(moving) < 2 or len({column.size for column in columns}) > 1:
         return table, 0
-    again = np.append(False, np.all([column[1:] == column[:-1] for column in columns], axis=0))
+    same = np.array([column[1:] == column[:-1] for column in columns])
+    often = ndimage.uniform_filter1d(same.astype(np.float64), AROUND, axis=1, mode="nearest")
+    again = np.append(False, np.all(same, axis=0) & (np.prod(often, axis=0) < BY_CHANCE))
     count = int(np.count_nonzero(again))
     if not 0 < count <= REPEATED * again.size:
         return table, 0
@@ -85,10 +92,11 @@ def time_base(mapping: ImportMap, table: DataTable, data: Path) -> tuple[Array, 
         )
     rows = np.zeros(t.size, dtype=bool)
     rows[mapping.span] = True
+    near = NEAR * float(np.median(np.diff(t))) if t.size > 1 else 0.0
     if mapping.start is not None:
-        rows &= t >= mapping.start
+        rows &= t >= mapping.start - near
     if mapping.stop is not None:
-        rows &= t <= mapping.stop
+        rows &= t <= mapping.stop + near
     if np.count_nonzero(rows) < 2:
         raise InputError(
             f"{data}: fewer than two rows lie between first_row and last_row; it has {t.size} rows."
