@@ -19,7 +19,7 @@ from common.safety.modes import MEANING, TURNS, Mode, mermaid
 from common.signals import CLIENT, OF_STOREYS, SENT, TOPICS
 from common.udp import packets
 from diagnosis.report import schema
-from docs import reference_tables, tried
+from docs import effect_equations, reference_tables, tried
 from docs.markdown import quantity, table
 
 EVERY_KIND = '[slave.a]\nkind = "table"\n[slave.b]\nkind = "column"\n'  # at slaves
@@ -68,6 +68,7 @@ def parts() -> dict[str, dict[str, str]]:
         "reference/signals.md": {"topics": topics()},
         "reference/commands.md": {"commands": reference_tables.commands()},
         "reference/effects.md": {"effects": reference_tables.effects()},
+        "reference/effect-equations.md": {"equations": effect_equations.equations()},
         "reference/compensators.md": {"compensators": reference_tables.compensators()},
         "reference/models.md": {
             "specimens": reference_tables.specimens(),
