@@ -254,7 +254,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """How well each nominal parameter is known, relative: one standard deviation. A diagnosis moves it by up to three."""
+    """How well each nominal parameter is known, relative: one standard deviation. A diagnosis allows up to three."""
 
     default: float = key("for every parameter not named", default=0.02, least=0.0, most=1.0)
     parameters: dict[str, float] = key(
