@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,10 +29,19 @@ LIGHTLY = (0.99, 0.96, 0.9, 0.8)  # of the largest stroke, where a stop may stan
 NEAREST = 3  # of the starts of such a stop, those that are fitted,
 ROUGH = 4  # so many steps; the best of them goes to its end
 AFTER = 0.4  # s after first contact that the shortest fit covers
+EARLY = 0.25  # of a test, after which the best start of each law goes on alone
 LONGER = 1.3  # factor from one fit to the next
 # Times the stroke before that: no motion that meets a stop goes so far, not even an unstable one.
 BEYOND = 30.0
 EVERY = 5  # of so many averaged samples one judges
+
+
+class Begun(NamedTuple):
+    """Where a fit over a piece of a test ended."""
+
+    values: Values
+    z: Array
+    left: float  # what it costs, 0 where nothing was fitted
 
 
 def touched(data: Data, fit: Fit, effect: Effect) -> Fit | None:
@@ -86,8 +96,13 @@ def stopped(data: Data, fit: Fit, effect: Effect) -> Fit | None:
     kept = (min(near[place : place + count], key=cost) for place in range(0, len(near), count))
     best = [item.values[effect.name] for item in kept]
     further = [under for values in best for under in further_laws(effect, values)]
-    begun = [*starts, *further]
-    fits = each(lambda start: grown(data, fit, effect, start, groups), begun)
+    begun = [{**fit.values, effect.name: dict(start)} for start in (*starts, *further)]
+    early = [piece for piece in lengths(groups, data.groups) if piece <= EARLY * data.groups]
+    met = each(lambda values: grown(data, values, np.zeros(fit.z.size), early), begun)
+    ahead = best_of_laws(met, effect.name) if early else met
+    late = lengths(groups, data.groups)[len(early) :]
+    longer = each(lambda item: grown(data, item.values, item.z, late), ahead)
+    fits = each(lambda item: fitting.fit(data, item.values, item.z, steps=6, rounds=2), longer)
     springs, others = by_law(fits, effect.name)
     return simplest(min(springs, key=cost), others)
 
@@ -137,15 +152,30 @@ def beginning(data: Data, fit: Fit, effect: Effect, start: Mapping[str, float], 
     return shorter(data, values, np.zeros(fit.z.size), groups)
 
 
-def grown(data: Data, fit: Fit, effect: Effect, start: Mapping[str, float], groups: int) -> Fit:
-    """One start, lengthened from so many averaged samples to the whole test."""
-    values: Values = {**fit.values, effect.name: dict(start)}
-    z = np.zeros(fit.z.size)
-    while groups < data.groups:
-        piece = shorter(data, values, z, groups)
-        values, z = piece.values, piece.z
+def lengths(groups: int, most: int) -> list[int]:
+    """Averaged samples of ever longer pieces of a test of `most`, from so many on."""
+    result = []
+    while groups < most:
+        result.append(groups)
         groups = int(LONGER * groups) + 1
-    return fitting.fit(data, values, z, steps=6, rounds=2)
+    return result
+
+
+def grown(data: Data, values: Values, z: Array, pieces: Sequence[int]) -> Begun:
+    """Where fits over longer and longer pieces end, each from where the one before it did."""
+    left = 0.0
+    for groups in pieces:
+        piece = shorter(data, values, z, groups)
+        values, z, left = piece.values, piece.z, cost(piece)
+    return Begun(values, z, left)
+
+
+def best_of_laws(met: Sequence[Begun], name: str) -> list[Begun]:
+    """Of fits over one piece the one of each law of an effect that leaves least, in the order of laws."""
+    best: dict[float, Begun] = {}
+    for item in sorted(met, key=lambda item: item.left):
+        best.setdefault(item.values[name].get("law", 0.0), item)
+    return [best[law] for law in sorted(best)]
 
 
 def shorter(data: Data, values: Values, z: Array, groups: int) -> Fit:
