@@ -25,6 +25,9 @@ UNLIKE = 0.5
 CALIBRATED = 0.01
 EVENLY = 3.0**-0.5  # rms of what is anywhere from zero to a bound, over that bound
 HELD = 2e-3  # s, for which a controller holds a command at most, as a rule
+# Rows in an interval from which on they are not the controller's own, but of a converter that may take its channels in
+# turn, some ten µs apart.
+OWN_RATE = 1.03
 # Standard deviation of the delay of a stated filter. PASSING: an analogue filter's parts are good to some per cent, and
 # a digital one that loses 3 dB at the same frequency, 100 Hz sampled at 500 Hz, delays slow motion by 13 % less.
 # BETWEEN: what readings do between ticks, as after the steps of a command, is known no better.
@@ -225,13 +228,17 @@ def between_rows(lab: RecordedLaboratory, stated: Sequence[ImportedChannel]) -> 
     """By how much all readings are late beyond stated delays, where their rows lie between ticks.
 
     What a controller holds tells between which two rows a tick is, not where. So it is with rows as fast as the ticks
-    that came late: another device wrote them, whose rows are in step by no more than the times say.
+    that came late: another device wrote them, whose rows are in step by no more than the times say. Of faster rows that
+    may be in step, and are taken to be so, a tick may lie up to a row before its own.
     """
-    rates = [one.rate for one in stated if one.rate > 0.0 and (one.interpolated or one.delay > 0.0)]
-    if not rates:
+    interval, rated = lab.plan.test.interval, [one for one in stated if one.rate > 0.0]
+    apart = [one.rate for one in rated if one.interpolated or one.delay > 0.0]
+    steady = [one.rate for one in rated if one.rate * interval > OWN_RATE]
+    if not apart and not steady:
         return ()
-    half = 0.5 / max(rates)
-    return (LoggedReadings("delay", EVENLY * half, lab, lab.kind.channels.names, least=-2.0 * half),)
+    row = 1.0 / max(apart or steady)
+    known = EVENLY * (0.5 * row if apart else row)
+    return (LoggedReadings("delay", known, lab, lab.kind.channels.names, least=-row),)
 
 
 def nothing_stated(mapped: ImportedData | None, lab: RecordedLaboratory) -> bool:

@@ -24,6 +24,7 @@ from diagnosis.recorded.logger.unseen import unseen
 from diagnosis.recorded.nuisances import (
     BETWEEN,
     CALIBRATED,
+    OWN_RATE,
     LoggedReadings,
     Nuisance,
     between_rows,
@@ -52,9 +53,6 @@ UNREST = 0.05  # first value over the largest one from which on a record does no
 # all that is faster; a cubic over REACH ticks to each side (20 ms) gives its place and rate there. 0.1 N on 100 kg
 # moves it by 30 µm in a piece, 1 N that changes sign every 10 mm at 0.2 m/s by 3 µm.
 PIECE, REACH = 0.25, 10
-# Rows in an interval from which on they are not the controller's own, but of a converter that may take its channels in
-# turn, some ten µs apart.
-OWN_RATE = 1.03
 HALF = 0.5  # of an interval, by which an output that holds its value is late on average
 BENT = 8  # times as many steps, in which a command that bends is all but straight
 # Systems of which a part keeps what they did: as many as the slopes of a fit take, and no more numbers than these.

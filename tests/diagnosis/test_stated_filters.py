@@ -215,6 +215,15 @@ def test_rows_between_ticks_leave_open_when_a_tick_was(cases: Cases) -> None:
     other = lab_b(logged(cases.record(), in_time, lambda x: x)).logged(NOT_LATE)
     (late,) = (one for one in other.nuisances if isinstance(one, LoggedReadings) and one.parameter == "delay")
     assert (late.tolerance, late.least) == pytest.approx((2e-3 / math.sqrt(12.0), -2e-3))
+    steady: dict[str, object] = {
+        "average": 6e-3,
+        "rate": 1000.0,
+    }  # in step with the ticks, as far as anyone knows
+    stands = lab_b(logged(cases.record(), steady, lambda x: x)).logged(NOT_LATE)
+    (late,) = (
+        one for one in stands.nuisances if isinstance(one, LoggedReadings) and one.parameter == "delay"
+    )
+    assert (late.tolerance, late.least) == pytest.approx((1e-3 / math.sqrt(3.0), -1e-3))
     of_controller: dict[str, object] = {"delay_stated": True, "rate": 500.0}
     on_ticks = lab_b(logged(cases.record(), of_controller, lambda x: x)).logged(NOT_LATE)
     assert [one for one in on_ticks.nuisances if isinstance(one, LoggedReadings)] == [
