@@ -363,27 +363,3 @@ def test_the_search_leads_back_to_the_first_law(cases: Cases, monkeypatch: pytes
     monkeypatch.setattr(best, "raced", lambda *_, **__: {})
     (found,) = in_best_laws([with_tails])
     assert "law" not in found.values["column.pinching"]
-
-
-class Held(Driven):
-    """A slider behind a fixture in the specimen's place, that slides sooner to one side."""
-
-    SLIDER: ClassVar = {"stiffness": 0.9 * K, "push": 9e3, "pull": 10e3, "play": 0.0, "corner": 0.0}
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.candidates = (CATALOGUE["column.yielding"], CATALOGUE["column.friction"])
-        noise = NOISE * np.random.default_rng(5).standard_normal(TICKS)
-        self.measured = (forces("slider", self.SLIDER, self.inputs) + noise)[:, None]
-
-
-def test_a_specimen_that_is_another_mechanism_is_found_though_that_one_promises_little_beside_it() -> None:
-    bare, yields = fitting.fit(data_of(Held()), {}), CATALOGUE["column.yielding"]
-    first = fitting.fit(bare.data, {yields.name: yields.values({"yield_displacement": LIMIT})})
-    found = best.as_specimens(bare, [first])
-    assert found[0].names == ("column.friction",)
-    values = found[0].values["column.friction"]
-    assert values["force"] == pytest.approx(9.5e3, rel=0.01)
-    assert values["stiffness"] == pytest.approx(Held.SLIDER["stiffness"], rel=0.02)
-    assert found[0].cost < 0.5 * first.cost
-    assert found[1] is first

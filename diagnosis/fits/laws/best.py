@@ -49,7 +49,8 @@ def in_best_laws(fits: list[Fit], *, modelled: bool = True) -> list[Fit]:
         fits = sorted([fitting.polished(fits[0]), *fits[1:]], key=cost)
         if whole(fits[0]):
             return fits
-    others = raced([item for item in fits if excess(item) <= MOST_LEFT * excess(fits[0])], modelled=modelled)
+    close = near(fits)
+    others = raced([item for item in fits if item.names[-1] in close], modelled=modelled)
     better = ending(sorted((others.get(item.names[-1], item) for item in fits), key=cost), fits)
     return sorted([under_the_first(better[0]), *better[1:]], key=cost)
 
@@ -58,16 +59,27 @@ def as_specimens(bare: Fit, fits: list[Fit]) -> list[Fit]:
     """Fits with one effect, best first, and with those that are the whole specimen under a further law.
 
     An effect beside the planned specimen may promise little where it is right in that one's place: a slider behind a
-    fixture follows no friction beside a spring. Effects that come near the best fit under their first law are there.
+    fixture follows no friction beside a spring. Effects that come near the best fit under their first law are there;
+    beside a specimen that comes much nearer than these all others are looked at as specimens too.
     """
     way = path(bare.data.part)
     if way is None or not fits or whole(fits[0]):
         return fits
-    near = {item.names[-1] for item in fits if excess(item) <= MOST_LEFT * excess(fits[0])}
-    missing = [one for one in bare.data.part.candidates if models_of(one) and one.name not in near]
-    found = [fitted(start, STEPS, ROUNDS) for effect in missing for start in modelled(bare, effect, way)[:1]]
-    others = [item for item in fits if item.names[-1] not in {one.names[-1] for one in found}]
-    return sorted([*found, *others], key=cost)
+    others = {one.name: one for one in bare.data.part.candidates if models_of(one)}
+    while missing := others.keys() - near(fits):
+        found = [
+            fitted(start, STEPS, ROUNDS)
+            for name in sorted(missing)
+            for start in modelled(bare, others.pop(name), way)[:1]
+        ]
+        least = {item.names[-1]: item for item in sorted([*found, *fits], key=cost, reverse=True)}
+        fits = sorted(least.values(), key=cost)
+    return fits
+
+
+def near(fits: list[Fit]) -> set[str]:
+    """The effects that came last in fits, best first, which leave no far more than the best."""
+    return {item.names[-1] for item in fits if excess(item) <= MOST_LEFT * excess(fits[0])}
 
 
 def modelled(bare: Fit, effect: Effect, way: tuple[Array, Array]) -> list[Fit]:
