@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from common.recording.imported import NOTHING_STATED, ImportedData
 from common.roles import MASTER
 from diagnosis.recorded.laboratory import RecordedLaboratory
 from diagnosis.signals.mask import Mask
@@ -48,11 +49,14 @@ def wanted(values: Array, there: Mask, *, at_end: bool) -> tuple[Array, Mask]:
     return (values, there) if at_end else (following(values), following(there))
 
 
-def received(signals: dict[str, Array], labs: tuple[RecordedLaboratory, ...]) -> dict[str, Ticks]:
+def received(
+    signals: dict[str, Array], labs: tuple[RecordedLaboratory, ...], stated: ImportedData
+) -> dict[str, Ticks]:
     """Put what slaves received in the place of what a log has as it was sent; the ticks that they received, by role.
 
     Without a compensator a slave's command is the target that it received. Where it is the target of an earlier tick,
-    the log has the master's own numbers, of which the others are on their way as long.
+    the log has the master's own numbers, of which the others are on their way as long. A command that is `stated` to
+    have passed a filter, which a number has not, is late by that as well, and tells nothing.
     """
     found: dict[str, Ticks] = {}
     for lab in labs:
@@ -63,6 +67,8 @@ def received(signals: dict[str, Array], labs: tuple[RecordedLaboratory, ...]) ->
         reached, target = signals[command], signals[sent[0]]
         used = in_force(signals, lab, target.size)
         if lab.kind.compensator(lab.plan).kind != "none" or not np.ptp(target):
+            continue
+        if stated.channel(lab.role, channels.command.name).chain != NOTHING_STATED.chain:
             continue
         ways = [np.clip(used - late, 0, None) for late in range(LATEST + 1)]
         missed = [float(np.std(reached - target[way])) for way in ways]

@@ -36,7 +36,7 @@ from diagnosis.recorded.nuisances import (
     of_logger,
 )
 from diagnosis.recorded.record import Late, Record
-from diagnosis.recorded.smoothed import smoothed
+from diagnosis.recorded.smoothed import noise_left, smoothed
 from diagnosis.signals import pieces
 from diagnosis.signals.mask import Mask
 from laboratories.effects.effect import Effect
@@ -167,8 +167,10 @@ class LaboratoryPart:
         self.inputs = {name: record.signals.get(name, np.zeros(record.ticks)) for name in self.devices}
         stated = record.stated or ImportedData("")
         sent = {name: stated.channel(lab.role, name) for name in self.devices if record.has(name)}
-        # what such a channel added to a command moved nothing
-        self.inputs |= {name: smoothed(self.inputs[name]) for name, one in sent.items() if one.blunt}
+        # what such a channel added to a command moved nothing, and is known at other frequencies than the motion's
+        read = {name: self.inputs[name] for name, one in sent.items() if one.blunt}
+        self.inputs |= {name: smoothed(values) for name, values in read.items()}
+        self.unsure = {name: noise_left(values, record.plan.test.seed) for name, values in read.items()}
         self.wanted = self.targets(record)
         self.measured, self.present = outputs(record, self.signals)
         machines = [machine for machine in lab.kind.machines(lab.plan) if self.moves(record, machine)]

@@ -288,7 +288,8 @@ def build(run: Run, plan: Plan | None = None, *, against_ideal: bool = False, ro
     signals, present = on_ticks(run, topics, without_rows(run, chosen.test.interval, ticks), labs)
     if against_ideal:
         at_targets(signals, present, labs)
-    on_their_way = received(signals, labs) if imported(run) is not None else {}
+    stated = imported(run)
+    on_their_way = received(signals, labs, stated) if stated is not None else {}
     worked_out = completed(signals, present, labs, chosen.test.interval, on_their_way)
     known = plan is None or (own is not None and own.ground_motion == plan.ground_motion)
     ground = believed_ground(run, chosen, ticks, known)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy import fft, optimize
@@ -26,11 +27,17 @@ SWING = 0.05  # of the range of a motion, by which it goes back at least after a
 FADE = 1.25  # times the highest frequency of the motion, up to which a reading fades away
 
 
-def smoothed(reading: Array) -> Array:
-    """A reading (n,) of a motion with no frequencies left above the highest at which it exceeds its white noise.
+class Smoothing(NamedTuple):
+    """What is kept of a reading of a motion, by the lines of its cosine transform."""
 
-    The reading as it is where the upper half of its frequencies is not free of motion. What is left out is at most as
-    large as the noise there.
+    kept: Array  # (n,) share of each line
+    noise: float  # rms of its white noise
+
+
+def smoothing(reading: Array) -> Smoothing | None:
+    """What to keep of a reading (n,): no frequency above the highest at which it exceeds its white noise.
+
+    None where the upper half of its frequencies is not free of motion, or has no noise.
     """
     lines = fft.dct(reading, norm="ortho")
     bands = np.square(lines[: lines.size // BAND * BAND]).reshape(-1, BAND).mean(axis=1)
@@ -38,11 +45,32 @@ def smoothed(reading: Array) -> Array:
     moving = np.flatnonzero(bands > MOVING * noise)
     highest = (moving[-1] + 1) * BAND if moving.size else 0
     if noise == 0.0 or bands.size < 2 or FADE * highest > UPPER * lines.size:
-        return reading
+        return None
     places = np.arange(lines.size)
     fading = np.clip((places - highest) / ((FADE - 1.0) * max(highest, 1)), 0.0, 1.0)
-    lines *= 0.5 * (1.0 + np.cos(np.pi * fading))
-    return np.asarray(fft.idct(lines, norm="ortho"))
+    return Smoothing(0.5 * (1.0 + np.cos(np.pi * fading)), math.sqrt(noise))
+
+
+def smoothed(reading: Array) -> Array:
+    """A reading (n,) of a motion with no frequencies left above the highest at which it exceeds its white noise.
+
+    The reading as it is where these cannot be told. What is left out is at most as large as the noise there.
+    """
+    found = smoothing(reading)
+    return reading if found is None else kept(found, reading)
+
+
+def noise_left(reading: Array, seed: int) -> Array:
+    """A draw (n,) of the white noise that smoothing leaves in a reading, at the frequencies of its motion."""
+    found = smoothing(reading)
+    if found is None:
+        return np.zeros(reading.size)
+    return kept(found, found.noise * np.random.default_rng(seed).standard_normal(reading.size))
+
+
+def kept(what: Smoothing, values: Array) -> Array:
+    """What is kept of values (n,)."""
+    return np.asarray(fft.idct(what.kept * fft.dct(values, norm="ortho"), norm="ortho"))
 
 
 def without_small_turns(path: Array, error: float) -> Array:

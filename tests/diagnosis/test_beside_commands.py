@@ -69,3 +69,5 @@ def test_noise_of_a_command_s_channel_moves_nothing(cases: Cases) -> None:
     inside = slice(50, -50)
     heard = float(np.std((part.inputs[COMMAND] - quiet.inputs[COMMAND])[inside]))
     assert heard < 0.75 * 2e-5
+    assert np.all(np.asarray(part.blurred) > 0.0)  # what is left of the noise at the motion's frequencies
+    assert np.all(np.asarray(quiet.blurred) < 0.01 * np.asarray(part.blurred))

@@ -7,7 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from common.recording.imported import ImportedChannel, ImportedData
+from common.recording.logger.low_pass import LoggerFilter
 from common.recording.reader import read
+from common.roles import SLAVE
 from diagnosis.diagnose import not_recorded
 from diagnosis.recorded import commands, record
 from diagnosis.recorded.record import Record
@@ -16,6 +19,7 @@ from models.registry import Array
 from tests.diagnosis.cases import Cases, lab_a
 
 EFFORT, COMMAND, TARGET = "damper_command", "table_command", "table_target"
+NUMBERS = ImportedData("log.csv")  # of which nothing is stated
 
 
 def without(whole: Record, *names: str) -> tuple[dict[str, Array], dict[str, Mask]]:
@@ -72,7 +76,7 @@ def test_numbers_that_were_sent_are_taken_for_those_that_were_received(numbered:
         signals[name] = np.append(whole.signals[name][late:], [whole.signals[name][-1]] * late)
     if numbered:
         signals["command_seq"] = np.clip(np.arange(whole.ticks) - float(late), 0.0, None)
-    commands.received(signals, whole.labs)
+    commands.received(signals, whole.labs, NUMBERS)
     for name in (TARGET, EFFORT):
         assert np.array_equal(signals[name][late:], whole.signals[name][late:])
 
@@ -81,7 +85,7 @@ def test_a_force_that_is_worked_out_is_on_its_way_as_long_as_the_targets_are(cas
     whole, late = cases.record(), 6
     signals, present = without(whole, EFFORT)
     signals[TARGET] = np.append(whole.signals[TARGET][late:], [whole.signals[TARGET][-1]] * late)
-    ways = commands.received(signals, whole.labs)
+    ways = commands.received(signals, whole.labs, NUMBERS)
     commands.completed(signals, present, whole.labs, 0.002, ways)
     expected, _ = without(whole, EFFORT)
     commands.completed(expected, dict(present), whole.labs, 0.002, {})
@@ -91,8 +95,22 @@ def test_a_force_that_is_worked_out_is_on_its_way_as_long_as_the_targets_are(cas
 def test_numbers_that_were_received_stay_as_they_are(cases: Cases) -> None:
     whole = cases.record({"table.delay": {"delay": 0.012}})
     signals, _ = without(whole)
-    commands.received(signals, whole.labs)
+    commands.received(signals, whole.labs, NUMBERS)
     assert all(np.array_equal(signals[name], whole.signals[name]) for name in signals)
+
+
+def test_a_command_behind_a_filter_does_not_tell_how_old_targets_were(cases: Cases) -> None:
+    whole = cases.record()
+    voltage = ImportedChannel(LoggerFilter("butterworth", 4, 129.0))
+    signals, _ = without(whole)
+    signals[COMMAND] = voltage.through(
+        signals[COMMAND], 0.002, 1e-3
+    )  # about two ticks late, as a held output is
+    before = dict(signals)
+    stated = ImportedData("log.csv", channels={SLAVE: {COMMAND: voltage}})
+    assert commands.received(signals, whole.labs, stated) == {}
+    assert all(np.array_equal(signals[name], before[name]) for name in signals)
+    assert commands.received(signals, whole.labs, NUMBERS) != {}
 
 
 def test_the_drift_of_the_building_stands_for_a_target_that_was_not_recorded(cases: Cases) -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis.recorded.smoothed import missed_at_turns, smoothed, turns, without_small_turns
+from diagnosis.recorded.smoothed import missed_at_turns, noise_left, smoothed, turns, without_small_turns
 
 STEP, ROWS = 1.0 / 1024.0, 12 * 1024
 NOISE = 3e-6  # m
@@ -30,6 +30,16 @@ def test_noise_above_the_motion_is_left_out_and_the_motion_is_not(highest: float
     # a dashpot multiplies noise by frequency: that of a reading is σ/(Δ√2) of its rate
     missed = np.gradient(found - true, STEP)
     assert np.std(missed) < 0.25 * NOISE / (np.sqrt(2.0) * STEP)
+
+
+def test_the_noise_that_is_left_is_as_large_as_that_which_smoothing_leaves() -> None:
+    true = motion(60.0)
+    reading = true + NOISE * np.random.default_rng(1).standard_normal(ROWS)
+    drawn = noise_left(reading, 5)
+    assert np.std(drawn) == pytest.approx(np.std(smoothed(reading) - true), rel=0.15)
+    assert np.std(smoothed(true + drawn) - true) == pytest.approx(np.std(drawn), rel=0.15)
+    assert np.array_equal(drawn, noise_left(reading, 5))
+    assert not noise_left(np.zeros(ROWS), 5).any()
 
 
 def test_a_reading_that_moves_at_all_frequencies_or_has_no_noise_stays_as_it_is() -> None:

@@ -1,4 +1,4 @@
-"""Commands of a controller that a data logger with slower rows did not record."""
+"""Commands of a controller that a data logger did not record as they were."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ class Driven(Protocol):
     lab: RecordedLaboratory
     role: str
     inputs: dict[str, Array]
+    unsure: dict[str, Array]
 
     def predict(self, system: System) -> Array:
         """Readings of the laboratory, (ticks, signals)."""
@@ -44,9 +45,10 @@ def shown(record: Record, topic: str, name: str) -> NDArray[np.int64] | None:
 
 
 def unseen(part: Driven, record: Record) -> Array | float:
-    """Rms (signals,) of what commands may have moved of which a logger with slow rows showed every few ticks.
+    """Rms (signals,) of what commands may have moved that is not known of them.
 
-    It is that of the plan's laboratory under a draw of the noise that such rows show; 0 where all ticks were shown.
+    A logger with slow rows showed them at every few ticks, and one that read them as voltages added noise of its own.
+    It is what the plan's laboratory makes of a draw of that noise; 0 where all commands are known.
     """
     target, seed = part.lab.signal(part.lab.kind.channels.target.name), record.plan.test.seed
     more = dict(part.inputs)
@@ -54,6 +56,8 @@ def unseen(part: Driven, record: Record) -> Array | float:
         ticks = shown(record, part.role, name if record.has(name) else target)
         if ticks is not None:
             more[name] = values + between_shown(values, ticks, seed + place)
+        if name in part.unsure:
+            more[name] = more[name] + part.unsure[name]
     if all(more[name] is values for name, values in part.inputs.items()):
         return 0.0
     plan = System(part.lab.plan)
