@@ -203,6 +203,7 @@ class LinkEffects:
 
     delay: float = 0.0  # s
     jitter: float = 0.0  # s, standard deviation
+    jitter_shape: float = 1.0  # of its Gamma distribution
     loss: float = 0.0  # share of messages
     burst: float = 1.0  # mean messages lost in a row
 

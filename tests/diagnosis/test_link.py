@@ -143,6 +143,29 @@ def test_without_time_stamps_jitter_and_loss_are_found_from_the_ages_of_messages
         assert value == pytest.approx(truth[name], rel=0.3 if name in ("probability", "burst") else 0.08)
 
 
+class HalfNormal:
+    """A link whose delays are the magnitudes of normal numbers."""
+
+    SCALE = 0.0025  # s
+
+    def __init__(self) -> None:
+        random = np.random.default_rng(3)
+        self.delays = {
+            name: np.abs(random.normal(0.0, self.SCALE, TICKS)) for name in ("command", "feedback")
+        }
+
+    def fate(self, direction: str, seq: int, t: float) -> float | None:
+        return float(self.delays[direction][seq])
+
+
+def test_jitter_of_another_shape_is_no_delay_beside_jitter() -> None:
+    found = values(recorded(HalfNormal(), stamps=False))
+    assert found.keys() == {"std", "shape"}
+    assert found["std"][0] == pytest.approx(HalfNormal.SCALE * np.sqrt(1.0 - 2.0 / np.pi), rel=0.1)
+    # (mean over standard deviation)² of half of a normal distribution, which is no Gamma distribution
+    assert found["shape"][0] == pytest.approx(2.0 / (np.pi - 2.0), rel=0.2)
+
+
 class Symmetric:
     """A link with delays that scatter symmetrically about their mean."""
 

@@ -1,8 +1,9 @@
 """Messages take varying times.
 
-    delay of a message = delay + n,    n exponential: mean and standard deviation are std
+    delay of a message = delay + n,    n ~ Gamma(shape, std/√shape): its mean is std·√shape, its standard deviation std
 
-with the delay of `link.delay`, in both directions. Only the number of whole intervals by which a message is late has an
+with the delay of `link.delay`, in both directions. With `shape` 1 it is exponential, with 2 nearly half of a normal
+distribution. Only the number of whole intervals by which a message is late has an
 effect. Not to be confused with noise of the damper's force: the age of each message distinguishes them.
 """
 
@@ -24,7 +25,17 @@ EFFECT = sets(
             sizes=(0.0003, 0.001, 0.003, 0.01),
             says="standard deviation",
         ),
+        "jitter_shape": Parameter(
+            "shape",
+            "",
+            null=1.0,
+            least=0.2,
+            most=20.0,
+            sizes=(1.0, 2.0),
+            says="of their Gamma distribution, 1 for an exponential one",
+            shape=True,
+        ),
     },
     says="messages take varying times",
-    reference="delay of a message = delay + n, n exponential of standard deviation std",
+    reference="delay of a message = delay + n, n ~ Gamma(shape, std/√shape)",
 )

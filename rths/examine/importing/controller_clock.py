@@ -114,7 +114,9 @@ def in_force(
     usual = np.floor(times / interval + ON_TICK).astype(int)
     tick, clear, same = usual.copy(), np.zeros(usual.size, dtype=bool), np.zeros(usual.size, dtype=bool)
     least, gained = APART * float(np.sqrt(np.mean(np.square(ground)))), 0
-    reach = AROUND + int(np.ceil(float(np.median(np.diff(times))) / interval - ON_TICK)) - 1  # of slower rows more
+    reach = (
+        AROUND + int(np.ceil(float(np.median(np.diff(times))) / interval - ON_TICK)) - 1
+    )  # of slower rows more
     for own in blocks(times / interval, fewest=0):
         near = usual[own, None] + gained + np.arange(-reach, reach + 1)
         away = np.abs(ground[np.clip(near, 0, ground.size - 1)] - values[own, None])

@@ -46,6 +46,12 @@ def test_delays_have_the_mean_and_the_scatter_asked_for(delay: float, jitter: fl
     assert drawn.std() == pytest.approx(jitter, rel=0.03, abs=1e-12)
 
 
+def test_delays_of_another_shape_have_the_mean_of_their_gamma_distribution() -> None:
+    drawn = np.array(fates(ImpairedLink(1, delay=0.001, jitter=0.002, jitter_shape=2.25)), dtype=np.float64)
+    assert drawn.mean() == pytest.approx(0.001 + 1.5 * 0.002, rel=0.02)
+    assert drawn.std() == pytest.approx(0.002, rel=0.03)
+
+
 @pytest.mark.parametrize(("loss", "burst"), [(0.01, 1.0), (0.05, 4.0), (0.3, 2.0), (0.02, 20.0)])
 def test_losses_have_the_share_and_the_burst_length_asked_for(loss: float, burst: float) -> None:
     lost = [fate is None for seed in range(4) for fate in fates(ImpairedLink(seed, loss=loss, burst=burst))]
@@ -100,6 +106,7 @@ def test_directions_and_seeds_are_independent() -> None:
         {"loss": np.nan},
         {"burst": 0.5},
         {"burst": np.inf},
+        {"jitter_shape": 0.0},
     ],
 )
 def test_impossible_link_parameters_are_refused(options: dict[str, float]) -> None:
