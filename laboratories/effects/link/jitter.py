@@ -25,6 +25,8 @@ EFFECT = sets(
             sizes=(0.0003, 0.001, 0.003, 0.01),
             says="standard deviation",
         ),
+    },
+    further={
         "jitter_shape": Parameter(
             "shape",
             "",
