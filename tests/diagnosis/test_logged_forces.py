@@ -19,7 +19,8 @@ from diagnosis.recorded.building import logged_building
 from diagnosis.recorded.building import motion as recorded_motion
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import LoggedBuilding
-from diagnosis.recorded.record import Record
+from diagnosis.recorded.nuisances import LATE
+from diagnosis.recorded.record import NOT_LATE, Delay, Late, Record
 from diagnosis.signals.noise.level import white_rms
 from models.registry import Array
 from models.system import System
@@ -48,6 +49,18 @@ def test_a_zero_of_a_logged_force_may_be_off_and_drift_below_its_noise(cases: Ca
     assert found["bias"] == pytest.approx(-0.5, abs=0.2)
     assert found["drift"] == pytest.approx(1.0, abs=0.2)
     assert not leaves(fit)
+
+
+def test_forces_of_a_building_may_be_as_late_as_its_laboratories_say(cases: Cases) -> None:
+    whole = cases.record()
+
+    def usual(late: Late) -> float:
+        part = LoggedBuilding(Building(replace(whole, late=late)))
+        (delay,) = (one for one in part.nuisances if one.parameter == "delay")
+        return delay.tolerance
+
+    assert usual(NOT_LATE) == usual(Late(force=Delay(0.003))) == pytest.approx(LATE)
+    assert usual(Late(force=Delay(0.016))) == pytest.approx(0.016)
 
 
 def test_numbers_that_were_logged_slowly_have_no_noise_beyond_half_their_rate(cases: Cases) -> None:

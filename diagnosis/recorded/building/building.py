@@ -10,7 +10,7 @@ from common.recording.imported import ImportedData
 from common.roles import MASTER
 from diagnosis.recorded.building import motion
 from diagnosis.recorded.building.motion import GROUND, MOTION
-from diagnosis.recorded.nuisances import of_building
+from diagnosis.recorded.nuisances import LATE, of_building
 from diagnosis.recorded.parts import Measured, of_sites
 from diagnosis.recorded.record import Record
 from laboratories.kinds import kind_of
@@ -63,6 +63,7 @@ class Building(Measured):
         seen = (*known, GROUND, self._force, *came)  # motion, ground and forces
         self.channels = tuple(stated.channel(MASTER, name) for name in seen)
         self._stated = stated.channel(MASTER, self._force)
+        self.usual = max(LATE, record.late.force.about)  # s, by which a logger of forces is late at most, as a rule
         self.nuisances = of_building(plan)
         self.candidates = of_sites(record, ("structure",), plan)
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import ndimage
 
 from diagnosis.recorded.building.building import Building
-from diagnosis.recorded.nuisances import ALIKE, CALIBRATED, LATE, UNLIKE, LoggedForce
+from diagnosis.recorded.nuisances import ALIKE, CALIBRATED, UNLIKE, LoggedForce
 from diagnosis.recorded.record import LEAST_TICKS, Delay
 from diagnosis.signals import alike, low_pass
 from diagnosis.signals.earlier import earlier
@@ -114,7 +114,7 @@ class LoggedBuilding(Building):
         there = of.present[:, : plan.storeys]
         self.present = ndimage.binary_erosion(there, np.ones((2 * SLOPES + 1, 1)), border_value=1)
         self.about = 0.0 if of.linear else self._stated.late
-        late = ALIKE if behind else max(ALIKE, UNLIKE * self.about) if self.about else LATE
+        late = ALIKE if behind else max(ALIKE, UNLIKE * self.about) if self.about else of.usual
         zero = STEADY * self._noise
         rows = (
             ("delay", late, self.about),
