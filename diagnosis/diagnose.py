@@ -20,7 +20,7 @@ from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged import building, delays, filters, logger, means, shapes, start
 from diagnosis.findings.sensors import jumps, outliers, readings, staircases, swaying, uneven_noise
 from diagnosis.findings.sensors.loud_noise import no_noise
-from diagnosis.findings.sensors.noise_levels import highest_rms, lines_rms, noise_rms
+from diagnosis.findings.sensors.noise_levels import lines_rms, noise_rms, sensors_rms
 from diagnosis.findings.sensors.readings import SensorFinding
 from diagnosis.findings.sensors.staircases import Stairs
 from diagnosis.findings.verdict import (
@@ -129,7 +129,7 @@ def examine(record: Record, tell: Tell = untold, more: Sequence[Record] = ()) ->
         {} if record.static else readings.held(record, found.steps)
     )  # a curve may stand still where it turns
     noisy = readings.findings(
-        record, rms_by_signal(found.verdicts, highest_rms), rounded, found.steps, logged=logged
+        record, rms_by_signal(found.verdicts, sensors_rms), rounded, found.steps, logged=logged
     )
     verdicts, noisy = machines_first(record, found.verdicts, noisy)
     loud = rms_by_signal(verdicts, noise_rms)

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from diagnosis.findings.sensors import noise_levels
 from diagnosis.fits import fitting, residuals
 from diagnosis.fits.noise import sensor_noise
 from diagnosis.fits.residuals import Data
+from diagnosis.fits.search import Search
 from diagnosis.recorded.parts import LaboratoryPart
 from diagnosis.signals.noise import colour
 from diagnosis.signals.noise.model import NoiseModel
@@ -131,3 +133,14 @@ def test_noise_at_rest_is_not_that_of_a_part_which_unseen_commands_move(cases: C
     assert sensor_noise.before_the_test(replace(data, part=still), place) is not None
     moved = data.part.replaced(blurred=10.0 * level)
     assert sensor_noise.before_the_test(replace(data, part=moved), place) is None
+
+
+@pytest.mark.parametrize(("times", "expected"), [(0.3, 0.3), (3.0, 1.0)])
+def test_a_sensor_is_no_noisier_than_before_the_test(cases: Cases, times: float, expected: float) -> None:
+    data, place, level = with_rest(cases, times, 0.0)
+    bare = fitting.fit(data, {})
+    found = noise_levels.sensors_rms(Search(data, bare, bare, ()))
+    whole = noise_levels.highest_rms(Search(data, bare, bare, ()))
+    assert found[place] == pytest.approx(expected * level, rel=0.05)
+    others = np.arange(found.size) != place
+    assert np.array_equal(found[others], whole[others])

@@ -7,6 +7,8 @@ import numpy as np
 from diagnosis.fits import hypothesis
 from diagnosis.fits.search import Search
 from diagnosis.fits.unexplained import MATERIAL, gaps
+from diagnosis.recorded.parts import LaboratoryPart
+from diagnosis.signals.noise.colour import SEGMENT
 from models.registry import Array
 
 # Share of a gap's rms that may be taken for coloured noise where only the residual itself is evidence: a sixth of its
@@ -24,6 +26,21 @@ def highest_rms(search: Search) -> Array:
     """Rms noise (signals,) of a part's sensors at the highest frequencies, without the lines that they pick up."""
     data, fit = search.data, search.chosen
     return data.white_part(data.residual(hypothesis.lay(data, fit.z, fit.values)))
+
+
+def sensors_rms(search: Search) -> Array:
+    """Rms noise (signals,) at the highest frequencies that is a sensor's: no more than before the test, where known.
+
+    What a machine does between the ticks, as a mass that follows each step of a command, looks like noise in the test.
+    """
+    data, level = search.data, highest_rms(search)
+    kept = data.part.rest if isinstance(data.part, LaboratoryPart) else ()
+    for place, readings in enumerate(kept):
+        if readings is not None and readings.size >= SEGMENT * data.group:
+            still = np.zeros((readings.size, level.size))
+            still[:, place] = readings - readings.mean()
+            level[place] = min(level[place], data.white_part(still)[place])
+    return level
 
 
 def lines_rms(search: Search) -> Array:
