@@ -88,10 +88,12 @@ def left_out(parameter: Parameter, values: Mapping[str, float]) -> bool:
 
 
 def free(effect: Effect, values: Mapping[str, float]) -> list[Free]:
-    """The parameters of an effect as a fit moves them, from where it starts."""
+    """The parameters of an effect that have values, as a fit moves them from there."""
     result = []
     law = effect.law(values)
     for parameter in effect.every:
+        if parameter.name not in values:
+            continue
         if law and parameter.shape and parameter.name not in law.shapes:
             continue
         logarithmic = math.isinf(parameter.null) or (parameter.shape and parameter.least > 0.0)
