@@ -51,16 +51,13 @@ class ReadSpectra(NamedTuple):
     frequency: Array  # (lines,) Hz
     read: Lines  # (lines, readings)
     true: Lines  # (lines, readings) without a filter
-    slopes: (
-        Array  # (2, lines · readings, parameters) real and imaginary parts of these over parameters near one
-    )
+    # (2, lines · readings, parameters) real and imaginary parts of these over parameters that err by about one
+    slopes: Array
     starts: NDArray[np.int64]  # (bands,) first line of each band
     bins: NDArray[
         np.int64
-    ]  # (bins,) first line of each of some bins in these, over which no filter changes much
-    products: (
-        Array  # (bins, readings, parameters, parameters) of slopes with one another, summed over each bin
-    )
+    ]  # (bins,) first line of each of the bins in bands over which no filter changes much
+    products: Array  # (bins, readings, parameters, parameters) of slopes with one another, summed over bins
     noisy: bool  # whether the readings without a filter hold noise that those recorded need not have
     rounds: int = ROUNDS  # of fits of the parameters, one where these are nearly at their best
 

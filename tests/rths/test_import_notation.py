@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from common.errors import InputError
-from report.text.cells import times
+from report.text.cells import Notation, times
+from report.text.decimals import fixed_decimals
 from report.text.tabular import read_table
 from report.text.text_form import StatedForm
 from tests.rths.imports import DRIVE
@@ -151,3 +152,25 @@ def test_thousands_are_for_texts_only(bring: Any, tmp_path: Path, capsys: Any, c
     words = ("import", tmp_path / "data.npz", "--map", tmp_path / "map.toml", "-o", tmp_path / "b.mcap")
     assert call(*words) == 2
     assert "is no text: leave out separator, decimal, thousands and skip_rows" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("cells", "decimals"),
+    [
+        (["1.50", "-0.25", "12.00"], 2),
+        (["15", "-2", "1200"], 0),
+        (["1.5", "-0.25", "12.0"], None),  # a program that leaves out zeros at the end
+        (["1.51", "-0.25", "12.37"], None),  # where no zero stands at an end it may leave them out
+        (["1.50e-3", "2.25e-3", "1.00e-2"], None),
+    ],
+)
+def test_decimals_are_fixed_where_all_numbers_have_as_many(cells: list[str], decimals: int | None) -> None:
+    rows = [["text", cell] for cell in cells * 20]
+    found = fixed_decimals(rows, ["name", "value"], Notation())
+    assert found == ({} if decimals is None else {"value": decimals})
+    assert fixed_decimals(rows[:3], ["name", "value"], Notation()) == {}  # too few to tell
+
+
+def test_decimals_of_a_decimal_comma_are_counted_behind_it() -> None:
+    rows = [[cell.replace(".", ",")] for cell in ["1.50", "-0.25", "12.00"] * 20]
+    assert fixed_decimals(rows, ["value"], Notation(",")) == {"value": 2}

@@ -63,9 +63,8 @@ class Building(Measured):
         seen = (*known, GROUND, self._force, *came)  # motion, ground and forces
         self.channels = tuple(stated.channel(MASTER, name) for name in seen)
         self._stated = stated.channel(MASTER, self._force)
-        self.usual = max(
-            LATE, record.late.force.about
-        )  # s, by which a logger of forces is late at most, as a rule
+        # s, standard deviation of the delay of a logger of forces
+        self.usual = max(LATE, record.late.force.about)
         self.nuisances = of_building(plan)
         self.candidates = of_sites(record, ("structure",), plan)
 
