@@ -120,6 +120,7 @@ UNRUN = {
         "rths blind --set unlisted --seed 77308 --cases 24 --only unknown --duration 12",
         "rths blind --set unlisted --seed 77309 --cases 30",
         "rths blind --set unlisted --seed 77310 --cases 24 --only unknown --duration 12",
+        "rths blind --set unlisted --seed 77311 --cases 32 --only unknown --duration 12",
         "rths blind --set unlisted_tune --seed 1 --cases 35 --duration 12",
         "rths blind --predict --cases 24 --seed 21 --only catalogue,formula,unknown --duration 20",
         "rths blind --predict --set materials --cases 8 --seed 3 --duration 20",
