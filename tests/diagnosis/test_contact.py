@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from diagnosis.fits import fitting, residuals
+from diagnosis.fits import contact, fitting, residuals
 from diagnosis.fits.contact import by_law, touched
 from models.registry import Array
 from tests.diagnosis.cases import Cases, estimate, lab_b, named
@@ -70,3 +71,19 @@ def test_a_stop_that_is_met_lightly_begins_from_all_its_stiffnesses(
     assert touched(data, bare, stop) is not None
     assert stop.contact is not None
     assert set(begun) == set(stop.contact.starts)
+
+
+def test_the_best_start_of_each_law_goes_on() -> None:
+    met = [
+        contact.Begun({"damper.stroke_stop": {"stiffness": float(place)} | law}, np.zeros(1), left)
+        for place, (law, left) in enumerate([({}, 3.0), ({}, 1.0), ({"law": 1.0}, 9.0), ({"law": 1.0}, 4.0)])
+    ]
+    assert contact.best_of_laws(met, "damper.stroke_stop") == [met[1], met[3]]
+
+
+def test_pieces_of_a_test_grow_until_it_is_whole() -> None:
+    pieces = contact.lengths(100, 1000)
+    assert pieces[0] == 100
+    assert all(after == int(1.3 * before) + 1 for before, after in pairwise(pieces))
+    assert pieces[-1] < 1000 <= int(1.3 * pieces[-1]) + 1
+    assert contact.lengths(1000, 1000) == []

@@ -166,6 +166,31 @@ def test_jitter_of_another_shape_is_no_delay_beside_jitter() -> None:
     assert found["shape"][0] == pytest.approx(2.0 / (np.pi - 2.0), rel=0.2)
 
 
+class Normal:
+    """A link whose delays are normal about a mean."""
+
+    MEAN, SCATTER = 0.007, 0.001  # s
+
+    def __init__(self) -> None:
+        random = np.random.default_rng(1)
+        self.delays = {
+            name: random.normal(self.MEAN, self.SCATTER, TICKS) for name in ("command", "feedback")
+        }
+
+    def fate(self, direction: str, seq: int, t: float) -> float | None:
+        return float(self.delays[direction][seq])
+
+
+def test_times_that_scatter_little_about_their_mean_are_a_delay() -> None:
+    assert values(recorded(Normal(), stamps=False)).keys() == {"std", "delay"}
+
+
+def test_a_delay_that_ages_hardly_tell_from_the_shape_of_jitter_is_not_named() -> None:
+    found = values(recorded(ImpairedLink(4, delay=0.001, jitter=0.002), stamps=False))
+    assert found.keys() == {"std", "shape"}
+    assert found["std"][0] == pytest.approx(0.002, rel=0.08)
+
+
 class Symmetric:
     """A link with delays that scatter symmetrically about their mean."""
 

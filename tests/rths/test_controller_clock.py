@@ -101,6 +101,15 @@ def test_ticks_that_pass_two_rows_of_twice_the_rate_tell_how_fast_the_clock_is(p
     assert found.fast == pytest.approx(1e-6 * ppm, abs=6e-6)
 
 
+def test_a_rate_that_bounds_leave_open_is_told_with_its_error() -> None:
+    times, _, values = logged(600.0, 0.1e-3, 40.0)
+    found = clock_of(times, [values], INTERVAL)
+    assert found is not None
+    assert abs(found.fast - 40e-6) < found.unsure < 40e-6
+    assert f"± {1e6 * found.unsure:.0f} ppm" in found.told
+    assert "±" not in found._replace(unsure=1e-6).told
+
+
 def test_smooth_and_rounded_and_slow_channels_tell_nothing() -> None:
     times, _, values = logged(1024.0, 0.4e-3, 0.0)
     smooth: Array = np.sin(3.0 * times)
