@@ -101,6 +101,13 @@ def test_ticks_that_pass_two_rows_of_twice_the_rate_tell_how_fast_the_clock_is(p
     assert found.fast == pytest.approx(1e-6 * ppm, abs=6e-6)
 
 
+def test_rows_that_ticks_pass_for_a_long_time_tell_as_well() -> None:
+    times, _, values = logged(600.0, 0.4e-3, 40.0)  # of five rows one is just before a tick, for seconds
+    found = clock_of(times, [values], INTERVAL)
+    assert found is not None
+    assert off(found, 0.4e-3, 40.0) < 0.25 / 600.0
+
+
 def test_a_rate_that_bounds_leave_open_is_told_with_its_error() -> None:
     times, _, values = logged(600.0, 0.1e-3, 40.0)
     found = clock_of(times, [values], INTERVAL)

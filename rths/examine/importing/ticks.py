@@ -13,7 +13,7 @@ ROUNDED = 0.03  # of an interval, by which times may be off: they are rounded wh
 ON_TICK = 0.01  # of an interval, within which a row is on its tick
 SHARP = 1e-3  # of an interval, the same of rows that are hardly closer than ticks
 OTHER = 0.01  # share of neighbours within one interval that may differ in a channel that holds
-OFTEN = 0.5  # share of them from which on those whose rows are not on a tick decide
+OFTEN = 0.2  # share of them from which on those whose rows are not on a tick decide
 TOLD = 2e-6  # of a clock, from which on it is said by how much its rate may err
 # Of an interval, by which rows are closer than ticks that share one too seldom to bound it well.
 HARDLY = 0.15
