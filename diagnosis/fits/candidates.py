@@ -13,7 +13,7 @@ import numpy as np
 
 from diagnosis.fits import contact, fitting
 from diagnosis.fits.fitting import TIED, Fit, everywhere, excess
-from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.hypothesis import Values, values_of_plan
 from diagnosis.fits.laws.best import as_specimens, begun, descended, in_best_laws, raced
 from diagnosis.fits.laws.loop import single
 from diagnosis.fits.laws.unlike_first import unlike_first
@@ -178,25 +178,28 @@ def alternatives(fit: Fit, first: list[Fit], scales: Scales) -> tuple[Fit, ...]:
     if len(fit.names) < 2:
         others = [item for item in first if item.names != fit.names]
         return tuple(
-            sorted([*others, *of_one_reading(fit, fit.names[0], others)], key=lambda item: item.cost)
+            sorted([*others, *under_own_laws(fit, fit.names[0], others)], key=lambda item: item.cost)
         )
     result: list[Fit] = []
     for name in single(fit):
         others = [item for item in extended(without(fit, name), scales, known=fit) if name not in item.names]
         if others and is_gap(fit) and excess(others[0]) < HOPELESS * excess(fit):
             others = under_further_laws(others)
-        result += [*others, *of_one_reading(fit, name, others)]
+        result += [*others, *under_own_laws(fit, name, others)]
     return tuple(sorted(result, key=lambda item: item.cost))
 
 
-def of_one_reading(fit: Fit, name: str, others: Sequence[Fit]) -> list[Fit]:
-    """Of fits with a fault of a reading exchanged for another those under a further law, where they come as near.
+def under_own_laws(fit: Fit, name: str, others: Sequence[Fit]) -> list[Fit]:
+    """Of fits with an effect exchanged for another those under a further law, where they come as near.
 
-    Under its first law a lag is far from a delay; of second order it may do the same.
+    They are of the same reading, or of the same machine as another value of the plan: under its first law a lag is far
+    from a delay, and one of second order may do the same; a compliance within a loop is a faster loop.
     """
     catalogue = fit.data.catalogue
-    signal = catalogue[name].signal
-    alike = [item for item in others if signal and catalogue[item.names[-1]].signal == signal]
+    signal, site = catalogue[name].signal, catalogue[name].site
+    known = name in values_of_plan(fit.data, fit.values)
+    last = [(item, catalogue[item.names[-1]]) for item in others]
+    alike = [item for item, one in last if (signal and one.signal == signal) or (known and one.site == site)]
     starts = [start for item in alike for start in begun(item, modelled=False)]
     found = each(lambda start: fitting.fit(start.data, start.values, start.z, STEPS), starts)
     return [item for item in found if item.cost < fit.cost + TIED]

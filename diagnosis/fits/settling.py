@@ -62,7 +62,7 @@ def settled(fit: Fit, accepted: Data | None = None) -> Fit:
     if sensor_noise.coloured(data):
         if not hidden(found, accepted):
             return replace(found, data=data) if found.data is not data else found
-        data = sensor_noise.flattened(sensor_noise.remodelled(fit))
+        data = sensor_noise.flattened(fit)
         data = replace(data, lines=sensor_noise.mains(found), spikes=None, undoubted=undoubted_noise(found))
     return under_white(found, data, fit.data)
 

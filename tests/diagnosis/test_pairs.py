@@ -30,11 +30,13 @@ def fit(values: Values, z: float = 0.0, off: Array | float = 0.0) -> Fit:
 
 @pytest.mark.parametrize(("density", "white"), [(0.25, 0.5), (4.0, 1.0), (None, 1.0)])
 def test_white_noise_in_the_place_of_coloured_noise_is_no_louder_than_averages(
-    density: float | None, white: float
+    monkeypatch: pytest.MonkeyPatch, density: float | None, white: float
 ) -> None:
     over = None if density is None else np.full(colour.GRID.size, density)
     data = replace(DATA, white=np.ones(1), noise=(NoiseModel(1.0, density=over),))
-    flat = sensor_noise.flattened(data)
+    monkeypatch.setattr(sensor_noise, "remodelled", lambda _: data)
+    monkeypatch.setattr(sensor_noise, "whitened", lambda _: data)
+    flat = sensor_noise.flattened(fit({}))
     assert flat.noise == ()
     assert flat.white == pytest.approx([white])
 

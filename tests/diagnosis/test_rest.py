@@ -144,3 +144,21 @@ def test_a_sensor_is_no_noisier_than_before_the_test(cases: Cases, times: float,
     assert found[place] == pytest.approx(expected * level, rel=0.05)
     others = np.arange(found.size) != place
     assert np.array_equal(found[others], whole[others])
+
+
+def test_noise_that_was_there_at_rest_stays_where_coloured_noise_is_doubted(cases: Cases) -> None:
+    """A gap that looks like slow noise of one reading makes no other reading's noise white."""
+    data, place, level = with_rest(cases, 1.0, 0.02)
+    part = data.part.first(data.groups * data.group)
+    assert isinstance(part, LaboratoryPart)
+    draws = np.random.default_rng(11).standard_normal((2, len(part.measured)))
+    part.measured = part.measured.copy()
+    slow = np.asarray(signal.lfilter([1.0], [1.0, -0.995], draws))
+    other = next(one for one in range(len(part.signals)) if one != place)
+    part.measured[:, place] += 0.02 * level * slow[0]
+    part.measured[:, other] += 0.02 * float(data.white[other]) * slow[1]
+    fit = fitting.at(replace(data, part=part, noise=()), {}, np.zeros(len(part.nuisances)))
+    found = sensor_noise.remodelled(fit).noise
+    assert (found[place].kind, found[other].kind) == ("ar", "ar")
+    noise = sensor_noise.flattened(fit).noise
+    assert (noise[place].source, noise[place].kind, noise[other].kind) == ("at rest", "ar", "white")

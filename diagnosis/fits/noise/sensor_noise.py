@@ -103,17 +103,28 @@ def whitened(fit: Fit) -> Data:
     )
 
 
-def flattened(data: Data) -> Data:
-    """The data with white noise in the place of coloured noise, no louder than averaged samples of that are.
+def flattened(fit: Fit) -> Data:
+    """The data with white noise in the place of the coloured noise that a fit leaves, no louder than averages of that.
 
     What follows the highest frequencies of a motion, as the inertia of a specimen does, hardly shows in averages, and
-    white noise of the level of single samples would hide it.
+    white noise of the level of single samples would hide it. Noise that readings at rest before the test have stays.
     """
-    averaged = [
-        item.rms if item.density is None else math.sqrt(np.trapezoid(item.density, colour.GRID))
-        for item in data.noise
-    ]
-    return residuals.measured_by(replace(data, noise=()), np.minimum(data.white, averaged))
+    data, flat = remodelled(fit), whitened(fit)
+    rested = [before_the_test(flat, place) for place in range(len(data.noise))]
+    models = tuple(
+        replace(known, lines=item.lines, resolution=item.resolution) if known else white(item)
+        for item, known in zip(data.noise, rested, strict=True)
+    )
+    level = np.minimum(data.white, [item.rms for item in models])
+    return residuals.measured_by(replace(data, noise=models if any(rested) else ()), level)
+
+
+def white(item: NoiseModel) -> NoiseModel:
+    """White noise that averaged samples of another noise are as loud as."""
+    if item.density is None:
+        return item
+    rms = math.sqrt(np.trapezoid(item.density, colour.GRID))
+    return NoiseModel(rms, lines=item.lines, resolution=item.resolution)
 
 
 def share(data: Data) -> float:
