@@ -19,11 +19,11 @@ from common.errors import InputError
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import PER_PERIOD, LoggedBuilding
 from diagnosis.recorded.ground import Ground
-from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, Part
+from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, LaboratoryPart, Part
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.noise import colour
-from diagnosis.signals.noise.level import white_rms
+from diagnosis.signals.noise.level import left_behind, white_rms
 from diagnosis.signals.noise.model import NoiseModel
 from diagnosis.signals.predictors.ceiling import Crosswise
 from laboratories.effects import CATALOGUE
@@ -133,13 +133,16 @@ class Data:
         """Rms (signals,) of the white part of residuals (ticks, signals), of the frequencies that a logger passed.
 
         Its filter cuts off the noise that came through it, and what it left above tells nothing of that. So as many
-        samples are averaged first as last half a wave of the highest frequency that it passed.
+        samples are averaged first as last half a wave of the highest frequency that it passed, and what the filter took
+        below that is given back.
         """
         together, result = self.together(len(residual)), np.empty(residual.shape[1])
         for size in np.unique(together):
             some = residual[: len(residual) // size * size, together == size]
             sums = some.reshape(-1, size, some.shape[1]).sum(axis=1) / math.sqrt(size)
             result[together == size] = white_rms(sums)
+        if isinstance(self.part, LaboratoryPart):
+            result /= left_behind(self.part.logged_by, together.tolist(), self.system.plan.test.interval)
         return result
 
     def together(self, ticks: int) -> NDArray[np.int64]:
@@ -197,13 +200,22 @@ class Data:
     @cached_property
     def factors(self) -> Array | None:
         """Factors (groups, signals) on the residuals' spectra that make the noise white; None where it is white."""
+        return self._factors(self.groups)
+
+    @cached_property
+    def _fast_factors(self) -> Array | None:
+        """The same on spectra of so many lines that the transforms are fast."""
+        return self._factors(colour.fast(self.groups))
+
+    def _factors(self, count: int) -> Array | None:
+        """Factors (count, signals) on spectra of so many lines."""
         if all(item.density is None for item in self.noise):
             return None
-        columns = np.ones((self.groups, self.sigma.size))
+        columns = np.ones((count, self.sigma.size))
         for place, item in enumerate(self.noise):
             if item.density is not None:
                 density = item.density + self.beside[place]
-                columns[:, place] = self.sigma[place] * colour.gains(density, self.groups)
+                columns[:, place] = self.sigma[place] * colour.gains(density, count)
         return columns
 
     def averaged(self, raw: Array) -> Array:
@@ -254,11 +266,11 @@ class Data:
 
     def coloured(self, raw: Array) -> Array:
         """The same where all that was recorded counts alike."""
-        if self.factors is None:
+        if self._fast_factors is None:
             return finite(self.averaged(raw))
         for place in np.flatnonzero(~self.there.all(axis=0)):
             raw[:, place] = filled(raw[:, place], self.there[:, place])
-        result = finite(colour.whitened(finite(self.averaged(raw)), self.factors))
+        result = finite(colour.whitened(finite(self.averaged(raw)), self._fast_factors))
         result[self.averaged(self.there.astype(np.float64)) < SPARSE * math.sqrt(self.group)] = 0.0
         return result
 

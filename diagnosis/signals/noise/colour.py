@@ -149,13 +149,24 @@ def gains(density: Array, count: int) -> Array:
     return np.asarray(np.exp(-0.5 * np.interp(places, GRID, np.log(density))))
 
 
-def whitened(x: Array, factors: Array) -> Array:
-    """Series (n, m) with the lines of their cosine spectra times factors (n, m): zero-phase, nothing wraps around.
+def fast(count: int) -> int:
+    """The least number of lines, no fewer than `count`, whose cosine spectra are fast: a product of 2, 3 and 5.
 
-    A cosine transform mirrors a series at its ends. The bends that this makes are loud where a filter left no noise,
-    so that samples near the ends of a series whose factors differ count as `LAST` deviations at most.
+    Those of a number with a large prime factor take several times as long.
     """
-    result: Array = fft.idct(factors * fft.dct(x, axis=0, norm="ortho"), axis=0, norm="ortho")
+    return int(fft.next_fast_len(count, real=True))
+
+
+def whitened(x: Array, factors: Array) -> Array:
+    """Series (n, m) with the lines of their cosine spectra times factors (l, m), l ≥ n: zero-phase, nothing wraps.
+
+    A cosine transform mirrors a series at its ends, as a series with fewer samples than lines is here before. The bends
+    that this makes are loud where a filter left no noise, so that samples near the ends of a series whose factors
+    differ count as `LAST` deviations at most.
+    """
+    longer = np.concatenate([x, x[2 * len(x) - len(factors) :][::-1]]) if len(factors) > len(x) else x
+    lines = factors * fft.dct(longer, axis=0, norm="ortho")
+    result: Array = fft.idct(lines, axis=0, norm="ortho")[: len(x)]
     ends = np.ix_(np.r_[: min(ENDS, len(x)), max(0, len(x) - ENDS) : len(x)], np.ptp(factors, axis=0) > 0.0)
     result[ends] = np.clip(result[ends], -LAST, LAST)
     return result
