@@ -122,6 +122,7 @@ def searched(bare: Fit, scales: Scales) -> Search:
     further = trade.under_unlike(bare, chosen, scales)
     others = [*candidates.alternatives(chosen, first, scales), *as_good, *further]
     others = sorted(others, key=lambda fit: fit.cost)
+    chosen, others = by_fewer(chosen, others, first, scales)
     if (more := trade.two_for_one(chosen, others, scales, MOST_NEEDED)) is not chosen:
         chosen, others = more, [chosen, *candidates.alternatives(more, first, scales)]
     chosen, others = trade.on_all(chosen, others)
@@ -134,6 +135,21 @@ def searched(bare: Fit, scales: Scales) -> Search:
         return found
     chosen, others = trade.on_all(chosen, candidates.alternatives(chosen, first, scales))
     return plainest(Search(bare.data, bare, chosen, tuple(map(trimmed, others))))
+
+
+def by_fewer(chosen: Fit, others: list[Fit], first: list[Fit], scales: Scales) -> tuple[Fit, list[Fit]]:
+    """The effects chosen and the alternatives, or fewer effects that do the same, with the chosen ones beside them.
+
+    They are those of an alternative that the data cannot tell from the chosen effects, and of which one does nothing: a
+    compliance within a loop does what a gain and a time constant do, and is found beside either of them only.
+    """
+    level = [fewest(item) for item in others if len(item.names) == len(chosen.names) and tied(chosen, item)]
+    stands, as_good = trade.simplest(
+        [chosen, *(item for item in level if len(item.names) < len(chosen.names))]
+    )
+    if stands is chosen:
+        return chosen, others
+    return stands, [*as_good, *candidates.alternatives(stands, first, scales)]
 
 
 def one_by_one(bare: Fit, scales: Scales) -> tuple[Fit, list[Fit]]:

@@ -9,11 +9,14 @@ import pytest
 
 from diagnosis.findings.certainty.other_causes import loop_of_several, other_causes, specimen_of_several
 from diagnosis.findings.sensors.one_motion import one_motion, one_place
-from diagnosis.findings.verdict import equivalents, judge
+from diagnosis.findings.verdict import equivalents, judge, with_effects
 from diagnosis.fits import fitting, residuals
+from diagnosis.fits import search as searching
 from diagnosis.fits.fitting import Fit
 from diagnosis.fits.hypothesis import Values
+from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import Search
+from diagnosis.fits.trade import tied
 from tests.diagnosis.cases import STRONGEST, Cases, lab_a, lab_b
 from tests.diagnosis.specimens import MadeSpecimen, data_of
 
@@ -118,3 +121,36 @@ def test_offsets_of_two_readings_may_be_those_of_a_piston_that_stands_elsewhere(
     assert any("stands elsewhere" in text for text in other_causes(found)) is one
     alone = {name: given for name, given in values.items() if "bias" in name}
     assert one_motion(replace(found, chosen=fitting.at(data, alone, bare.z))) is one
+
+
+def test_a_compliance_within_a_loop_stands_for_a_gain_and_a_time_constant_that_do_the_same(
+    cases: Cases,
+) -> None:
+    whole = cases.record({"actuator.compliance": {"compliance": 7e-9, "law": 1.0}})
+    data = residuals.prepare(lab_a(whole), whole)
+    found = searching.search(data, Scales(whole))
+    assert (found.chosen.names, found.chosen.values["actuator.compliance"]["law"]) == (
+        ("actuator.compliance",),
+        1.0,
+    )
+    assert found.chosen.values["actuator.compliance"]["compliance"] == pytest.approx(7e-9, rel=0.1)
+    both = next(item for item in found.alternatives if len(item.names) == 2)
+    assert set(both.names) == {"actuator.gain", "actuator.time_constant"}
+    assert tied(found.chosen, both)
+
+
+def test_an_effect_under_a_law_that_fits_worse_is_no_alternative_beside_one_under_a_law_that_is_as_good(
+    cases: Cases,
+) -> None:
+    """A compliance behind a loop is none where one within it cannot be told from a time constant."""
+    whole = cases.record({"actuator.time_constant": {"factor": 0.93}})
+    data = residuals.prepare(lab_a(whole), whole)
+    factor = {"actuator.time_constant": {"factor": 0.93}}
+    bare, chosen = (fitting.fit(data, values) for values in ({}, factor))
+    other = Fit(data, {"actuator.compliance": {"law": 0.0}}, chosen.z, bare.reduced)
+    same = replace(chosen, values={"actuator.compliance": {"law": 1.0}})
+    found = with_effects(Search(data, bare, chosen, (same, other)))
+    assert found.equivalent == (("actuator.time_constant", "actuator.compliance"),)
+    assert found.others == ()
+    alone = with_effects(Search(data, bare, chosen, (other,)))
+    assert [item.names for item, _ in alone.others] == [("actuator.compliance",)]

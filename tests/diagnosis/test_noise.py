@@ -8,6 +8,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from common.errors import InputError
+from common.recording.imported import ImportedChannel
+from common.recording.logger.low_pass import LoggerFilter
 from diagnosis.signals.noise import level
 from diagnosis.signals.noise.rounding import quantum, quantum_between
 from models.registry import Array
@@ -121,3 +123,28 @@ def test_the_error_of_steps_is_no_louder_than_its_rms(hidden: float) -> None:
     error = np.round(motion) - motion
     found = level.white_rms(np.stack([error, error], axis=1))
     assert found == pytest.approx(np.sqrt(1.0 / 12.0), rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("kind", "order", "cutoff", "size"),
+    [("bessel", 3, 156.0, 2), ("butterworth", 4, 100.0, 3), ("bessel", 2, 40.0, 7)],
+)
+def test_what_a_filter_took_of_noise_below_its_cutoff_is_known(
+    kind: str, order: int, cutoff: float, size: int
+) -> None:
+    """White noise through the filter ten times as fast as the ticks, whose level at rest is one."""
+    interval, times = 0.002, 10
+    passed = LoggerFilter(kind, order, cutoff)
+    noise = np.random.default_rng(4).standard_normal(60000 * times) * np.sqrt(times)
+    frequencies: Array = np.asarray(np.fft.rfftfreq(noise.size, interval / times), dtype=np.float64)
+    lines = np.asarray(np.fft.rfft(noise)) * passed.response(frequencies)
+    ticks = np.fft.irfft(lines, noise.size)[::times]
+    sums = ticks[: ticks.size // size * size].reshape(-1, size).sum(axis=1) / np.sqrt(size)
+    (found,) = level.left_behind([ImportedChannel(passed)], [size], interval)
+    assert level.white_rms(sums[:, None])[0] == pytest.approx(found, rel=0.03)
+    assert found < 0.9
+
+
+def test_noise_that_passed_no_filter_is_all_there() -> None:
+    found = level.left_behind([ImportedChannel(), ImportedChannel(delay=0.01)], [1, 3], 0.002)
+    assert found == pytest.approx([1.0, 1.0])
