@@ -111,12 +111,11 @@ def with_effects(search: Search) -> PartVerdict:
     named = (1.0 + sum(value for value, yes in zip(chances, same, strict=True) if yes)) / whole
     sure = (1.0 - DOUBT[outcome]) * certainty(search) * (EITHER if any(other_causes(search)) else 1.0)
     level = [set(other.names) for other, yes in zip(search.alternatives, same, strict=True) if yes]
-    others = (
-        tuple(  # those under a law that is not as good stand for none beside the same ones under one that is
-            (other, sure * value / whole)
-            for other, value in zip(search.alternatives, chances, strict=True)
-            if set(other.names) not in level
-        )
+    # effects under a law that is not as good stand for none beside the same ones under one that is
+    others = tuple(
+        (other, sure * value / whole)
+        for other, value in zip(search.alternatives, chances, strict=True)
+        if set(other.names) not in level
     )
     return PartVerdict(search, outcome, sure * named, others, equivalents(search))
 
