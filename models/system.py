@@ -28,7 +28,8 @@ class ActuatorEffects:
     compliance: float = 0.0  # m/N
     compliance_law: float = 0.0  # 0 behind the loop, between piston and specimen, 1 within the loop
     deadband: float = 0.0  # m, whole band of the loop's error without flow
-    deadband_law: float = 0.0  # 0 with sharp edges, 1 with edges that leak
+    deadband_law: float = 0.0  # 0 with sharp edges, 1 with edges that leak, 2 with lands that leak
+    null_gain: float = 0.1  # flow gain at null over that outside, of an overlap with lands that leak
     learned: tuple[float, ...] = ()  # a law of `models.preisach` that adds to the motion, m
 
 

@@ -41,8 +41,11 @@ SERVO, DISPLACEMENT, FORCE, PLAYED, LOOSE, SERVO_RATE, STATES = range(7)
 PRESENT, VELOCITY_LIMIT, BACKLASH, COMPLIANCE, DEADBAND, GAIN, STIFFNESS, HELD, HYDRAULIC, BEYOND, BEFORE = (
     range(11)
 )
-SPRING_BACK, LEAKING, LOAD, SHARPNESS, STALL = range(11, 16)  # LOAD: compliance within the loop
+# LOAD: compliance within the loop
+SPRING_BACK, LEAKING, NULL_GAIN, LOAD, SHARPNESS, STALL = range(11, 17)
 WITHIN_LOOP = 1.0  # law of `actuator.compliance`: the load takes from the error of the loop
+# laws of `actuator.deadband`: an overlap whose edges leak, and one that leaks all over
+EDGES_LEAK, LANDS_LEAK = 1.0, 2.0
 # laws of `actuator.backlash`: the play between command and loop, and greased play behind the loop
 BEFORE_LOOP, GREASED = 1.0, 2.0
 
@@ -123,9 +126,14 @@ def valve(effects: ActuatorEffects) -> tuple[float, float]:
     return effects.velocity_limit_sharpness, effects.stall_force
 
 
-def formulas(effects: ActuatorEffects) -> tuple[float, float]:
-    """The time (s) in which a specimen springs back through play, 0 where it is dry, and whether an overlap leaks."""
-    return effects.spring_back if effects.backlash_law == GREASED else 0.0, effects.deadband_law
+def formulas(effects: ActuatorEffects) -> tuple[float, float, float]:
+    """The time (s) in which a specimen springs back through play, 0 where it is dry, and how an overlap leaks.
+
+    That is whether its edges do, and the flow gain at null over that outside.
+    """
+    back = effects.spring_back if effects.backlash_law == GREASED else 0.0
+    null_gain = effects.null_gain if effects.deadband_law == LANDS_LEAK else 0.0
+    return back, float(effects.deadband_law == EDGES_LEAK), null_gain
 
 
 def hydraulic(
@@ -296,7 +304,7 @@ def blocked(limits: Array, error: float) -> float:
     half = 0.5 * limits[DEADBAND]
     if limits[LEAKING] != 0.0:
         return half * math.tanh(error / half)
-    return min(max(error, -half), half)
+    return (1.0 - limits[NULL_GAIN]) * min(max(error, -half), half)
 
 
 @jit

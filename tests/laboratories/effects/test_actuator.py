@@ -24,16 +24,16 @@ LAG = "actuator.time_constant"
 
 
 @pytest.mark.parametrize(("gain", "load"), [(1.0, 0.0), (0.9, 2e-8)])
-@pytest.mark.parametrize("leaking", [0.0, 1.0], ids=["sharp", "leaking"])
+@pytest.mark.parametrize("law", [0.0, 1.0, 2.0], ids=["sharp", "leaking", "open_at_null"])
 @pytest.mark.parametrize(
     ("limit", "band"), [(0.02, 0.0), (math.inf, 4e-4), (0.03, 4e-4)], ids=["limit", "band", "both"]
 )
 def test_the_servo_loop_solves_its_equation_with_limit_dead_band_and_load(
-    limit: float, band: float, leaking: float, gain: float, load: float
+    limit: float, band: float, law: float, gain: float, load: float
 ) -> None:
     actuator = Actuator(gain=gain, delay=0.0133, time_constant=0.030)
     command = tones(400, size=1.5e-3)
-    more = ActuatorEffects(velocity_limit=limit, deadband=band, deadband_law=leaking)
+    more = ActuatorEffects(velocity_limit=limit, deadband=band, deadband_law=law, null_gain=0.3)
     more = replace(more, compliance=load, compliance_law=1.0)
     got = run_a(command, actuator, actuator_effects=more)[:, 0]
     reached = ramped(command, 0.0133)
@@ -41,7 +41,9 @@ def test_the_servo_loop_solves_its_equation_with_limit_dead_band_and_load(
     def slope(t: float, y: Array) -> Any:
         error = gain * reached(t) - y - load * K * y
         half = band / 2
-        blocked = half * np.tanh(error / half) if leaking and band else np.clip(error, -half, half)
+        blocked = (0.7 if law == 2.0 else 1.0) * np.clip(error, -half, half)
+        if law == 1.0 and band:
+            blocked = half * np.tanh(error / half)
         return np.clip((error - blocked) / 0.030, -limit, limit)
 
     times = DT * np.arange(1, command.size + 1)

@@ -6,6 +6,11 @@
 
     T·ẏ = e − width/2·tanh(2·e/width)
 
+With `law` 2 the lands of the valve leak all over the overlap, where they let a share of the flow through, the flow gain
+at null over that outside:
+
+    T·ẏ = e − (1 − null_gain)·clip(e, −width/2, +width/2)
+
 Not to be confused with `actuator.backlash`, a play with
 memory behind the piston: the dead band leaves a slow creep short of the target.
 """
@@ -30,8 +35,22 @@ EFFECT = sets(
             swallows=True,
         ),
     },
-    further={"deadband_law": which_law(1.0, "0 with sharp edges, 1 with edges that leak")},
-    laws=(Law("sharp", {}), Law("leaking", {})),
+    further={
+        "deadband_law": which_law(
+            2.0, "0 with sharp edges, 1 with edges that leak, 2 with lands that leak all over the overlap"
+        ),
+        "null_gain": Parameter(
+            "null_gain",
+            "",
+            null=0.1,
+            least=0.0,
+            most=0.9,
+            sizes=(0.1,),
+            says="flow gain at null over that outside the overlap, of law 2",
+            shape=True,
+        ),
+    },
+    laws=(Law("sharp", {}), Law("leaking", {}), Law("open at null", {"null_gain": 0.1})),
     says="small errors of the loop cause no flow",
     reference="Merritt, Hydraulic Control Systems, Wiley 1967",
 )
