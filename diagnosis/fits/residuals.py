@@ -19,7 +19,8 @@ from common.errors import InputError
 from diagnosis.recorded.building.building import Building
 from diagnosis.recorded.building.logged_building import PER_PERIOD, LoggedBuilding
 from diagnosis.recorded.ground import Ground
-from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, LaboratoryPart, Part
+from diagnosis.recorded.joined import laboratory_of
+from diagnosis.recorded.parts import EXACT, FINE_ERROR, MODEL_ERROR, Part
 from diagnosis.recorded.record import Record
 from diagnosis.signals.mask import Mask
 from diagnosis.signals.noise import colour
@@ -141,8 +142,8 @@ class Data:
             some = residual[: len(residual) // size * size, together == size]
             sums = some.reshape(-1, size, some.shape[1]).sum(axis=1) / math.sqrt(size)
             result[together == size] = white_rms(sums)
-        if isinstance(self.part, LaboratoryPart):
-            result /= left_behind(self.part.logged_by, together.tolist(), self.system.plan.test.interval)
+        if (lab := laboratory_of(self.part)) is not None:
+            result /= left_behind(lab.logged_by, together.tolist(), self.system.plan.test.interval)
         return result
 
     def together(self, ticks: int) -> NDArray[np.int64]:

@@ -21,6 +21,7 @@ from diagnosis.fits import residuals
 from diagnosis.fits.fitting import fit
 from diagnosis.fits.scales import Scales
 from diagnosis.fits.search import search
+from diagnosis.recorded.joined import JoinedPart
 from diagnosis.recorded.logger.through import through_logger
 from diagnosis.recorded.nuisances import LoggedReadings
 from diagnosis.recorded.record import NOT_LATE, Record
@@ -105,6 +106,8 @@ def test_noise_is_measured_by_the_frequencies_that_passed(cases: Cases) -> None:
     assert data.part.passes[place] == 60.0
     by_ticks = white_rms(data.residual(data.system))[place]
     assert data.white[place] > 0.9 * 4.0 * level > 30.0 * by_ticks
+    both = residuals.prepare(JoinedPart([data.part, data.part]), passed)
+    assert both.white[place] == pytest.approx(data.white[place], rel=0.05)
 
 
 @pytest.mark.long
