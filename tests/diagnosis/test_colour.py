@@ -83,6 +83,20 @@ def test_noise_of_any_colour_does_not_count_as_a_gap(name: str) -> None:
     assert np.abs(np.corrcoef(flat[1:], flat[:-1])[0, 1]) < 0.1
 
 
+def test_noise_is_whitened_alike_by_more_lines_that_are_fast() -> None:
+    """4007 is a prime number; of 4050 lines the last 43 samples are those before, turned back."""
+    noise = np.asarray(signal.lfilter([1.0], [1.0, -0.9], np.random.default_rng(2).standard_normal(4007)))
+    density, _ = colour.density([noise])
+    assert colour.fast(noise.size) == 4050
+    assert colour.fast(4050) == 4050
+    few, more = (
+        colour.whitened(noise[:, None], colour.gains(density, count)[:, None])[:, 0] for count in (4007, 4050)
+    )
+    assert few.shape == more.shape
+    assert np.std(more) == pytest.approx(1.0, abs=0.03)
+    assert np.max(np.abs(more - few)[:-10]) < 0.05
+
+
 def test_the_ends_of_whitened_noise_are_as_loud_as_the_rest() -> None:
     smooth = signal.butter(8, 20.0, fs=RATE, output="sos")
     noise = averaged(np.asarray(signal.sosfilt(smooth, white(14, TICKS))[4000:]))

@@ -148,3 +148,8 @@ def test_what_a_filter_took_of_noise_below_its_cutoff_is_known(
 def test_noise_that_passed_no_filter_is_all_there() -> None:
     found = level.left_behind([ImportedChannel(), ImportedChannel(delay=0.01)], [1, 3], 0.002)
     assert found == pytest.approx([1.0, 1.0])
+
+
+def test_noise_that_is_measured_where_a_filter_leaves_none_is_not_made_any_louder() -> None:
+    passed = ImportedChannel(LoggerFilter("butterworth", 4, 5.0))
+    assert level.left_behind([passed], [1], 0.002) == pytest.approx([level.LEAST])

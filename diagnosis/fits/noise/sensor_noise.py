@@ -112,14 +112,14 @@ def flattened(fit: Fit) -> Data:
     data, flat = remodelled(fit), whitened(fit)
     rested = [before_the_test(flat, place) for place in range(len(data.noise))]
     models = tuple(
-        replace(known, lines=item.lines, resolution=item.resolution) if known else white(item)
+        replace(known, lines=item.lines, resolution=item.resolution) if known else as_white(item)
         for item, known in zip(data.noise, rested, strict=True)
     )
     level = np.minimum(data.white, [item.rms for item in models])
     return residuals.measured_by(replace(data, noise=models if any(rested) else ()), level)
 
 
-def white(item: NoiseModel) -> NoiseModel:
+def as_white(item: NoiseModel) -> NoiseModel:
     """White noise that averaged samples of another noise are as loud as."""
     if item.density is None:
         return item

@@ -18,6 +18,8 @@ BELOW = 0.8  # rms of differences over what their median says, below which these
 OUTERMOST = 6.0
 ORDER = 4  # of the differences of samples, which show noise apart from motions
 LINES = 512  # frequencies over which what a filter left of noise is summed
+# Share of noise that two filters leave at a common cutoff: where less is left, what is measured passed none of them.
+LEAST = 0.5
 
 
 def white_rms(residual: Array) -> Array:
@@ -50,7 +52,7 @@ def left_behind(channels: Sequence[ImportedChannel], sizes: Sequence[int], inter
     """Shares (channels,) of the rms of white noise that `white_rms` of sums of `sizes` samples finds behind filters.
 
     It looks at the highest frequencies of such sums, of which a filter may have taken some below its cutoff. The noise
-    came before the filters, and the ticks are an interval (s) apart.
+    came before the filters, and the ticks are an interval (s) apart. A share is no less than `LEAST`.
     """
     turns = math.pi * (np.arange(LINES) + 0.5) / (2 * LINES)  # to a half of the rate of the ticks
     found = []
@@ -58,4 +60,4 @@ def left_behind(channels: Sequence[ImportedChannel], sizes: Sequence[int], inter
         seen = np.square(np.sin(size * turns)) ** (ORDER + 1) / np.square(np.sin(turns))
         passed = np.square(np.abs(channel.response(turns / (math.pi * interval))))
         found.append(float(np.sqrt(np.sum(passed * seen) / np.sum(seen))))
-    return np.array(found)
+    return np.maximum(found, LEAST)
