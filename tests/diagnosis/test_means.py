@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from common.recording.imported import ImportedChannel
+from common.recording.logger.low_pass import LoggerFilter
 from common.recording.logger.passing import averaged
 from diagnosis.findings.found import Diagnosis
 from diagnosis.findings.logged import filters, means
@@ -23,13 +24,13 @@ INTERVAL, LENGTH = 0.002, 11e-3  # s
 TICKS = INTERVAL * np.arange(4000)
 
 
-def stated(whole: Record, delay: float) -> Record:
-    """The record as an import whose map states a delay of all readings."""
+def stated(whole: Record, channel: ImportedChannel) -> Record:
+    """The record as an import whose map states the same of all readings."""
     found = imported(whole, lambda x: x)
     names = {lab.role: lab.measured for lab in found.labs}
     said = found.mapped
     assert said is not None
-    channels = {role: dict.fromkeys(those, ImportedChannel(delay=delay)) for role, those in names.items()}
+    channels = {role: dict.fromkeys(those, channel) for role, those in names.items()}
     run = found.run
     run = replace(run, metadata=run.metadata | {"import": replace(said, channels=channels).metadata()})
     return replace(found, run=run)
@@ -72,7 +73,7 @@ def test_a_stated_delay_is_that_of_a_mean_where_readings_say_so(cases: Cases, av
     read = mean if averages else lambda x: ImportedChannel(delay=0.5 * LENGTH).through(x, INTERVAL)
     names = [name for lab in whole.labs for name in lab.measured]
     moved = {name: read(whole.signals[name]) for name in names}
-    record = stated(replace(whole, signals=whole.signals | moved), 0.5 * LENGTH)
+    record = stated(replace(whole, signals=whole.signals | moved), ImportedChannel(delay=0.5 * LENGTH))
     found = means.averaged(record)
     assert bool(found.passed) == averages
 
@@ -80,6 +81,24 @@ def test_a_stated_delay_is_that_of_a_mean_where_readings_say_so(cases: Cases, av
         channel = found.stated.channel("slave", "damper_stroke")  # type: ignore[union-attr]
         assert channel.late == pytest.approx(0.5 * LENGTH)
         assert channel.average == pytest.approx(LENGTH, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "passed",
+    [
+        ImportedChannel(LoggerFilter("butterworth", 4, 60.0), delay=2e-3),
+        ImportedChannel(delay=4e-3, average=8e-3),
+    ],
+)
+def test_a_delay_beside_a_stated_filter_or_mean_is_that_of_no_other_mean(
+    cases: Cases, passed: ImportedChannel
+) -> None:
+    """Not even where another mean is in the readings: it would stand in the place of what is stated."""
+    whole = cases.record()
+    names = [name for lab in whole.labs for name in lab.measured]
+    moved = {name: mean(passed.through(whole.signals[name], INTERVAL)) for name in names}
+    record = stated(replace(whole, signals=whole.signals | moved), passed)
+    assert means.averaged(record) is record
 
 
 def test_series_are_brought_behind_a_mean_of_one_of_them() -> None:
@@ -93,7 +112,9 @@ def test_the_building_is_judged_behind_the_mean_of_its_force(cases: Cases) -> No
     whole = cases.record()
     read = whole.signals | {"column_force": mean(whole.signals["column_force"])}
     record = replace(
-        stated(whole, 0.0), signals=read, passed={("master", "column_force"): ImportedChannel(average=LENGTH)}
+        stated(whole, ImportedChannel()),
+        signals=read,
+        passed={("master", "column_force"): ImportedChannel(average=LENGTH)},
     )
     plain = Building(record)
     assert plain.treated

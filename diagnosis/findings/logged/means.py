@@ -29,13 +29,14 @@ SHORTEST, LONGEST = 1.4, 2.8
 def averaged(record: Record) -> Record:
     """An imported record whose readings are means, where they are far less surprising so than with a stated delay only.
 
-    All readings must have one stated delay: a logger averages its channels alike.
+    All readings must have one stated delay, and no filter or mean: a logger averages its channels alike.
     """
     if record.stated is None or record.static or record.ticks < LEAST_TICKS:
         return record
     labs = [part for part in parts_of(record) if isinstance(part, LaboratoryPart)]
-    said = {channel.delay for part in labs for channel in part.channels}
-    if len(said) != 1 or (delay := said.pop()) <= 0.0:
+    channels = [channel for part in labs for channel in part.channels]
+    said = {channel.delay for channel in channels}
+    if len(said) != 1 or (delay := said.pop()) <= 0.0 or any(channel.blunt for channel in channels):
         return record
     spectra = [one.spectra for one in of_laboratories(record, labs)]
     surprise = partial(low_pass.surprises, spectra)
