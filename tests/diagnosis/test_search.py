@@ -32,6 +32,7 @@ from tests.diagnosis.test_laws import Sizes
 # play behind the loop, of which the law of play before the loop promises nothing
 PLAYED = {"width": 1.5e-4, "contact": 200.0, "flank": 0.7, "guide": 628.0, "law": 1.0}
 BACK = {"width": 2e-4, "law": 2.0, "spring_back": 6e-3}
+LANDS = {"width": 4e-4, "law": 2.0, "null_gain": 0.08}
 ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth, relative error allowed
     ("ground.scale", {"factor": 1.08}, {"factor": 0.005}),
     ("structure.mass", {"factor": 1.1}, {"factor": 0.05}),
@@ -41,6 +42,7 @@ ALONE: list[tuple[str, dict[str, float], dict[str, float]]] = [  # effect, truth
     ("table.backlash", {**PLAYED, "width": 6e-4}, {"law": 0.0}),  # the platform never reaches a flank
     ("actuator.backlash", BACK, {"width": 0.05, "spring_back": 0.1}),
     ("actuator.deadband", {"width": 4e-4, "law": 1.0}, {"width": 0.05, "law": 0.0}),
+    ("actuator.deadband", LANDS, {"width": 0.05, "null_gain": 0.1, "law": 0.0}),
     ("actuator.compliance", {"compliance": 1.5e-8, "law": 1.0}, {"compliance": 0.05, "law": 0.0}),
     ("actuator.delay", {"delay": 6e-3}, {"delay": 0.1}),  # the plan's own delay is known to 0.28 ms only
     ("column.friction", {"force": 900.0}, {"force": 0.05}),
