@@ -288,9 +288,10 @@ class SlaveLoop(RigLoop):
             self.lab.say_why()
 
     def leave(self, *, last: bool = False) -> None:
-        """Tell the master of the end and send the recorder the rest.
+        """Send the recorder the rest and tell the master of the end.
 
-        Repeated until `left`, and called a `last` time.
+        Repeated until `left`, and called a `last` time. The recorder comes first: what this laboratory sends passes
+        through the master, which may be gone as soon as it knows of the end.
         """
         lab = self.lab
         if not self._due(last=last):
@@ -299,9 +300,9 @@ class SlaveLoop(RigLoop):
         if lab.exchange.state is State.STOPPING:
             lab.exchange.happen(Event.FINISH)
         self._say_end()
+        self._hand_over()
         if session and (last or lab.exchange.state is State.DONE):
             lab.endpoint.send(Stopped(session, self.ticks))
-        self._hand_over()
 
     @property
     def left(self) -> bool:
